@@ -1,0 +1,38 @@
+# Two commands: `make quickstart` and `make test`. Both install what is missing first (scripts/setup.sh).
+# More arguments: make quickstart ARGS="--steps 2000"     make test ARGS="-k registry"
+SHELL := /bin/bash
+BIN := .venv/bin
+ARGS ?=
+# The scenes that the result is judged by, and that are never trained on.
+HOLDOUT ?= bottles foliage
+
+.PHONY: help setup quickstart test lint format lock clean
+
+help: ## this list
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+
+setup: ## virtual environment, dependencies, OpenGL
+	@scripts/setup.sh
+
+quickstart: setup ## sample scenes, then the main job on them; prints where the report is
+	$(BIN)/diaphane samples samples
+	$(BIN)/diaphane build samples/*.usd* --budgets 1,2,4 --name quickstart $(addprefix --holdout ,$(HOLDOUT)) $(ARGS)
+
+lint: setup ## style, types, direction of imports
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test: lint ## lint, then all tests
+	$(BIN)/pytest $(ARGS)
+
+format: setup ## rewrite the sources in the house style
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+lock: ## requirements.lock anew from pyproject.toml (needs uv)
+	scripts/lock.sh
+
+clean: ## remove the environment, caches and the samples; keeps .diaphane
+	rm -rf .venv build ./*.egg-info samples .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache

@@ -1,0 +1,143 @@
+"""The oracle: plain float64, one pixel at a time, as METHOD sections 2 and 3 are written. Slow on purpose."""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from schemas.colour import decode_gamma2, linear_to_srgb
+from schemas.fragments import FragmentDump
+from schemas.tail import DENSITY_G, MAX_EXPONENT, MetricName, TailName
+
+Colour = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Pixel:
+    """One pixel's list, decoded to the space in which it is composited.
+
+    Attributes:
+        colour: float64 [n, 3], front to back; linear RGB (or stored values, for metric `paper`).
+        alpha: float64 [n].
+        depth: float64 [n], metres.
+        background: float64 [3], in the space of `colour`.
+    """
+
+    colour: NDArray[np.float64]
+    alpha: NDArray[np.float64]
+    depth: NDArray[np.float64]
+    background: NDArray[np.float64]
+
+    @property
+    def n(self) -> int:
+        """Number of fragments."""
+        return len(self.alpha)
+
+
+def pixel_of(dump: FragmentDump, p: int, stored: bool = False) -> Pixel:
+    """Pixel p of a dump, in linear RGB, or in stored values / 255 if `stored`."""
+    part = slice(dump.offsets[p], dump.offsets[p + 1])
+    rgba, background = dump.rgba[part], dump.background[p]
+    return Pixel(
+        colour=rgba[:, :3] / 255.0 if stored else decode_gamma2(rgba[:, :3]),
+        alpha=rgba[:, 3] / 255.0,
+        depth=dump.depth[part].astype(np.float64),
+        background=background / 255.0 if stored else decode_gamma2(background),
+    )
+
+
+def tail_weights(pixel: Pixel, tail: TailName, g: float = DENSITY_G) -> NDArray[np.float64]:
+    """float64 [n], the weights with which colours enter the tail's mean; they do not depend on k."""
+    if tail != "density" or pixel.n == 0:
+        return pixel.alpha.copy()
+    z_min, z_max = pixel.depth[0], pixel.depth[-1]
+    if z_max == z_min:
+        return pixel.alpha.copy()
+    optical_depth = sum(-math.log(max(1.0 - a, 1e-3)) for a in pixel.alpha)
+    exponent = g * optical_depth * (pixel.depth - z_min) / (z_max - z_min)
+    return np.asarray(pixel.alpha * np.exp(-np.minimum(exponent, MAX_EXPONENT)), dtype=np.float64)
+
+
+def composite(pixel: Pixel, k: int, tail: TailName = "density", g: float = DENSITY_G) -> Colour:
+    """Colour of a pixel with k core fragments, float64 [3], in the space of `pixel.colour`."""
+    transmittance, core = 1.0, np.zeros(3)
+    for i in range(k):
+        core = core + transmittance * pixel.alpha[i] * pixel.colour[i]
+        transmittance *= 1.0 - pixel.alpha[i]
+    behind = slice(k, pixel.n)
+    alpha, weight = pixel.alpha[behind], tail_weights(pixel, tail, g)[behind]
+    if len(alpha) == 0 or weight.sum() == 0.0:
+        return np.asarray(core + transmittance * pixel.background)
+    mean = (weight[:, None] * pixel.colour[behind]).sum(axis=0) / weight.sum()
+    if tail in ("density", "exact-coverage"):
+        through = float(np.prod(1.0 - alpha))
+    else:
+        through = float(max(1.0 - alpha.sum() / len(alpha), 0.0) ** len(alpha))
+    opacity = 1.0 if tail == "paper" else 1.0 - through
+    return np.asarray(core + transmittance * (opacity * mean + through * pixel.background))
+
+
+def exact(pixel: Pixel) -> Colour:
+    """Colour with all fragments composited in order, float64 [3]."""
+    return composite(pixel, pixel.n, "exact-coverage")
+
+
+def curve(
+    dump: FragmentDump, p: int, tail: TailName = "density", g: float = DENSITY_G, metric: MetricName = "display"
+) -> NDArray[np.float64]:
+    """float64 [n+1], e_p(k): squared difference from the exact colour, summed over RGB."""
+    pixel = pixel_of(dump, p, stored=metric == "paper")
+    colours = np.array([composite(pixel, k, tail, g) for k in range(pixel.n)] + [exact(pixel)])
+    encoded = linear_to_srgb(colours) if metric == "display" else colours
+    return np.asarray(((encoded - encoded[-1]) ** 2).sum(axis=1))
+
+
+def heap_removal(
+    curves: Sequence[NDArray[np.float32]], budget: int, k_min: int, key: Literal["absolute", "increment"] = "absolute"
+) -> list[int]:
+    """Algorithm 1 of DHOIT, literally: take one fragment at a time from the pixel with the smallest key.
+
+    Args:
+        curves: Per pixel its errors float32 [n+1].
+        budget: F; removal stops when no more than F fragments are left, or none can be removed.
+        k_min: No pixel goes below `min(k_min, n)`.
+        key: `absolute`: the error after the removal (as printed); `increment`: by how much it grows.
+
+    Returns:
+        k of each pixel. Ties go to the smaller pixel index.
+    """
+    k = [len(e) - 1 for e in curves]
+
+    def entry(p: int) -> tuple[float, int]:
+        error = curves[p]
+        after = error[k[p] - 1]
+        return float(after if key == "absolute" else after - error[k[p]]), p
+
+    heap = [entry(p) for p in range(len(curves)) if k[p] > k_min]
+    heapq.heapify(heap)
+    used = sum(k)
+    while used > budget and heap:
+        _, p = heapq.heappop(heap)
+        k[p] -= 1
+        used -= 1
+        if k[p] > k_min:
+            heapq.heappush(heap, entry(p))
+    return k
+
+
+def optimum(curves: Sequence[NDArray[np.float32]], budget: int, k_min: int) -> float:
+    """Smallest sum of errors over all k with `min(k_min, n) <= k <= n` and `sum k <= F`, by dynamic programming."""
+    best = np.full(budget + 1, math.inf)
+    best[0] = 0.0
+    for error in curves:
+        spent = np.full(budget + 1, math.inf)
+        for k in range(min(k_min, len(error) - 1), min(len(error) - 1, budget) + 1):
+            spent[k:] = np.minimum(spent[k:], best[: budget + 1 - k] + float(error[k]))
+        best = spent
+    return float(best.min())

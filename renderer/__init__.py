@@ -1,0 +1,1 @@
+"""From a USD scene to fragments, images and metrics."""

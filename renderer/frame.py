@@ -1,0 +1,208 @@
+"""One view of a scene on the GPU, and the passes that every technique shares: opaque, count, gather."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.gpu_scene import OPAQUE, TRANSPARENT, GpuScene
+from renderer.programs import Defines
+from schemas.colour import encode_gamma2
+from schemas.limits import LIMITS
+from schemas.problem import ExitCode, Problem
+from schemas.view import View
+
+RGB = tuple[float, float, float]
+
+# Shader storage bindings that several passes share.
+COUNT, Z_MIN, Z_MAX, NEAREST_COLOUR, NEAREST_FACING = range(5)
+
+
+@dataclass(slots=True)
+class Gathered:
+    """Order-independent sums of a frame, on the GPU.
+
+    Attributes:
+        sums: RGBA32F textures: `gather/gather.frag` says what each holds; one if only the tail needs it, else five.
+        nearest_colour: uint32 [P], packed colour of the nearest fragment, all ones where none; None if not gathered.
+        nearest_facing: uint32 [P], its |n . e| * 255; None if not gathered.
+    """
+
+    sums: list[moderngl.Texture]
+    nearest_colour: moderngl.Buffer | None = None
+    nearest_facing: moderngl.Buffer | None = None
+
+
+@dataclass(slots=True)
+class Clock:
+    """Milliseconds of each pass: finished host clock, since timer queries read zero on software drivers."""
+
+    ctx: moderngl.Context
+    passes: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def measure(self, name: str) -> Iterator[None]:
+        """Time a block, the GPU's work included."""
+        self.ctx.finish()
+        start = time.perf_counter()
+        yield
+        self.ctx.finish()
+        self.passes[name] = self.passes.get(name, 0.0) + 1e3 * (time.perf_counter() - start)
+
+
+class Frame:
+    """A view being rendered. Makes the opaque background at once; count and gather on demand, once.
+
+    Args:
+        gpu: The uploaded scene.
+        view: The camera.
+        width: Pixels per row.
+        height: Rows; row 0 is at the top.
+        clear: Linear RGB where no opaque surface is.
+    """
+
+    def __init__(self, gpu: GpuScene, view: View, width: int, height: int, clear: RGB = (1.0, 1.0, 1.0)) -> None:
+        if width < 1 or height < 1 or width * height > LIMITS.pixels:
+            raise Problem(
+                f"A picture of {width}x{height} pixels is outside the limits.",
+                f"Ask for 1x1 up to {LIMITS.pixels:,} pixels.",
+                ExitCode.LIMIT,
+            )
+        self.gpu, self.ctx, self.view = gpu, gpu.ctx, view
+        self.width, self.height, self.pixels = width, height, width * height
+        self.clock = Clock(self.ctx)
+        self.uniforms = self._camera()
+        self.background = self.ctx.texture((width, height), 4)
+        self.background.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        self.depth = self.ctx.depth_renderbuffer((width, height))
+        self._counts: moderngl.Buffer | None = None
+        self._range: tuple[moderngl.Buffer, moderngl.Buffer] | None = None
+        self._gathered: dict[bool, Gathered] = {}
+        self._count_array: NDArray[np.uint32] | None = None
+        with self.clock.measure("opaque"):
+            self._draw_opaque(clear)
+
+    def _camera(self) -> dict[str, object]:
+        to_view = self.view.world_to_view()
+        near, far = self.view.clip_range(self.gpu.scene.bounds)
+        projection = self.view.projection(self.width / self.height, near, far)
+        projection[1] *= -1.0  # row 0 at the top
+        up = to_view[:3, :3] @ np.array(self.gpu.scene.up)
+        return {
+            "world_to_view": tuple(to_view.T.astype(np.float32).ravel().tolist()),
+            "projection": tuple(projection.T.astype(np.float32).ravel().tolist()),
+            "orthographic": self.view.ortho_height is not None,
+            "up_view": tuple(up.tolist()),
+            "width": self.width,
+        }
+
+    def target(self, colours: list[moderngl.Texture]) -> moderngl.Framebuffer:
+        """A framebuffer with these attachments and the opaque depth."""
+        return self.ctx.framebuffer(color_attachments=colours, depth_attachment=self.depth)
+
+    def _draw_opaque(self, clear: RGB) -> None:
+        target = self.target([self.background])
+        target.use()
+        stored = encode_gamma2(np.array(clear)) / 255.0
+        red, green, blue = stored.tolist()
+        target.clear(red, green, blue, 1.0, depth=1.0)
+        self.ctx.enable_only(moderngl.DEPTH_TEST)
+        target.depth_mask = True
+        self.gpu.draw("opaque/opaque.frag", OPAQUE, self.uniforms)
+
+    def draw_transparent(
+        self,
+        fragment: str,
+        target: moderngl.Framebuffer,
+        defines: Defines | None = None,
+        scissor: tuple[int, int] | None = None,
+        **uniforms: object,
+    ) -> None:
+        """Draw the transparent layers against the opaque depth, blending additively where there are attachments.
+
+        Args:
+            fragment: Shader file.
+            target: From `target`.
+            defines: Shader defines.
+            scissor: First row and number of rows, or all.
+            uniforms: Added to the camera's.
+        """
+        target.use()
+        first, rows = scissor or (0, self.height)
+        target.scissor = (0, first, self.width, rows)
+        target.depth_mask = False
+        self.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
+        self.ctx.blend_func = moderngl.ONE, moderngl.ONE
+        self.gpu.draw(fragment, TRANSPARENT, {**self.uniforms, **uniforms}, defines)
+        self.ctx.enable_only(moderngl.NOTHING)
+
+    def buffer(self, words: int, fill: int) -> moderngl.Buffer:
+        """A storage buffer of uint32, every word set to `fill`.
+
+        Raises:
+            Problem: It would be larger than a storage buffer may be.
+        """
+        size = 4 * max(words, 1)
+        if size > LIMITS.buffer_bytes:
+            raise Problem(
+                f"A buffer of {size / 2**20:.0f} MiB is above the limit of {LIMITS.buffer_bytes / 2**20:.0f} MiB.",
+                "Ask for a smaller picture or budget.",
+                ExitCode.LIMIT,
+            )
+        made = self.ctx.buffer(reserve=size)
+        made.clear(chunk=np.uint32(fill).tobytes())
+        return made
+
+    def passes(self, *names: str) -> dict[str, float]:
+        """Milliseconds of the shared passes of these names, each as it was when it ran."""
+        return {name: self.clock.passes[name] for name in names}
+
+    def count(self) -> NDArray[np.uint32]:
+        """uint32 [P], n(p): the count pass, its result read back."""
+        if self._count_array is None:
+            with self.clock.measure("count"):
+                buffer = self.depth_range()[0]
+                self._count_array = np.frombuffer(buffer.read(4 * self.pixels), dtype=np.uint32)
+        return self._count_array
+
+    def depth_range(self) -> tuple[moderngl.Buffer, moderngl.Buffer, moderngl.Buffer]:
+        """Buffers of n, z_min and z_max (float bits), uint32 [P] each, on the GPU."""
+        if self._counts is None or self._range is None:
+            self._counts = self.buffer(self.pixels, 0)
+            self._range = self.buffer(self.pixels, 0xFFFFFFFF), self.buffer(self.pixels, 0)
+            for binding, buffer in ((COUNT, self._counts), (Z_MIN, self._range[0]), (Z_MAX, self._range[1])):
+                buffer.bind_to_storage_buffer(binding)
+            self.draw_transparent("count/count.frag", self.target([]), {"RANGE": 1})
+            self.ctx.memory_barrier()
+        return self._counts, *self._range
+
+    def gather(self, full: bool) -> Gathered:
+        """The sums of every pixel: all of them with the nearest fragment, or only what the density tail needs."""
+        if full not in self._gathered:
+            _, z_min, z_max = self.depth_range()
+            with self.clock.measure("gather" if full else "gather-tail"):
+                self._gathered[full] = self._gather(full, z_min, z_max)
+        return self._gathered[full]
+
+    def _gather(self, full: bool, z_min: moderngl.Buffer, z_max: moderngl.Buffer) -> Gathered:
+        made = Gathered([self.ctx.texture((self.width, self.height), 4, dtype="f4") for _ in range(5 if full else 1)])
+        z_min.bind_to_storage_buffer(Z_MIN)
+        z_max.bind_to_storage_buffer(Z_MAX)
+        if full:
+            made.nearest_colour = self.buffer(self.pixels, 0xFFFFFFFF)
+            made.nearest_facing = self.buffer(self.pixels, 0)
+            made.nearest_colour.bind_to_storage_buffer(NEAREST_COLOUR)
+            made.nearest_facing.bind_to_storage_buffer(NEAREST_FACING)
+        target = self.target(made.sums)
+        for texture in made.sums:
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            self.ctx.framebuffer([texture]).clear(0.0, 0.0, 0.0, 0.0)
+        self.draw_transparent("gather/gather.frag", target, {"FULL": int(full), "NEAREST": int(full)})
+        self.ctx.memory_barrier()
+        return made

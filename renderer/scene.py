@@ -1,0 +1,153 @@
+"""From a USD stage to SceneArrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Sdf, Tf, Usd, UsdGeom
+
+from renderer.usd.assemble import Placed, assemble
+from renderer.usd.cameras import read_cameras
+from renderer.usd.digest import scene_digest
+from renderer.usd.instances import Draw, Walker
+from renderer.usd.materials import MaterialTable
+from renderer.usd.meshes import read_shape
+from renderer.usd.parts import Part, bindings, build_parts, canonical_path
+from renderer.usd.stage import WarningLog, open_stage, stage_time, usd_diagnostics
+from renderer.usd.textures import TextureTable
+from schemas.problem import ExitCode, Problem
+from schemas.scene import SceneArrays
+
+__all__ = ["LoadOptions", "load_scene", "scene_digest"]
+
+UP_AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+
+ShapeKey = tuple[Sdf.Path, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LoadOptions:
+    """How a stage is read.
+
+    Attributes:
+        alpha: Opacity in (0,1] of every surface, instead of its own; cut-outs keep their shape, a texture's opacity
+            without a threshold is multiplied. None: as authored.
+        time: Time code to read at; None: the start of the stage's range.
+        variants: Selections `set=choice` (every prim that has the set) or `/prim/path:set=choice`.
+    """
+
+    alpha: float | None = None
+    time: float | None = None
+    variants: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.alpha is not None and not 0.0 < self.alpha <= 1.0:
+            raise Problem(f"An alpha of {self.alpha} is not possible.", "Give a number above 0 and at most 1.")
+
+
+def load_scene(path: Path, options: LoadOptions = LoadOptions()) -> SceneArrays:
+    """Reads a USD file and everything it refers to.
+
+    Args:
+        path: A .usd, .usda, .usdc or .usdz file.
+        options: Alpha, time and variants.
+
+    Raises:
+        Problem: The file is missing, is not USD, has no geometry, or has points that are not finite.
+    """
+    log = WarningLog()
+    try:
+        with usd_diagnostics(log):
+            stage = open_stage(path, options.variants)
+            scene = _StageReader(stage, path, options, log).read()
+    except Tf.ErrorException as error:
+        raise Problem(
+            f"{path} cannot be read: {str(error).strip()[:300]}", "Check it with usdchecker.", ExitCode.USAGE
+        ) from error
+    return replace(scene, warnings=log.lines())
+
+
+class _StageReader:
+    """Reads one stage; the parts of each distinct shape are made once."""
+
+    def __init__(self, stage: Usd.Stage, path: Path, options: LoadOptions, log: WarningLog) -> None:
+        self._stage = stage
+        self._path = path
+        self._alpha = options.alpha
+        self._log = log
+        self._time = stage_time(stage, options.time)
+        self._textures = TextureTable()
+        self._materials = MaterialTable(self._time, self._textures, log)
+        self._metres = _metres_per_unit(stage, log)
+
+    def read(self) -> SceneArrays:
+        """The whole scene, without the warnings."""
+        placed = self._placed()
+        if not placed:
+            raise Problem(
+                f"{self._path} has no geometry that can be drawn.",
+                "Check that it has visible meshes or gprims of purpose default or render.",
+                ExitCode.USAGE,
+            )
+        arrays = assemble(placed)
+        up = str(UsdGeom.GetStageUpAxis(self._stage))
+        return SceneArrays(
+            name=self._path.stem,
+            positions=arrays.positions,
+            normals=arrays.normals,
+            uvs=arrays.uvs,
+            colours=arrays.colours,
+            indices=arrays.indices,
+            batches=arrays.batches,
+            textures=tuple(self._textures.textures),
+            origin=arrays.origin,
+            bounds=arrays.bounds,
+            up=UP_AXES.get(up, UP_AXES["Y"]),
+            metres_per_unit=self._metres,
+            cameras=read_cameras(self._stage, self._time, arrays.origin, self._metres, self._log),
+            warnings=(),
+        )
+
+    def _placed(self) -> list[Placed]:
+        parts: dict[ShapeKey, list[Part]] = {}
+        matrices: dict[ShapeKey, list[NDArray[np.float64]]] = {}
+        for draw in Walker(self._time, self._log).draws(self._stage):
+            key = shape_key(draw)
+            if key not in parts:
+                shape = read_shape(draw.prim, self._time, self._log)
+                parts[key] = [] if shape is None else build_parts(draw.prim, shape, self._materials, self._alpha)
+            matrices.setdefault(key, []).append(draw.matrices)
+        scale = np.diag([self._metres, self._metres, self._metres, 1.0])
+        return [
+            Placed(part, np.concatenate(matrices[key]) @ scale)
+            for key, shape_parts in parts.items()
+            for part in shape_parts
+        ]
+
+
+def shape_key(draw: Draw) -> ShapeKey:
+    """What decides how a prim looks: its place in its prototype, its materials and inherited display primvars.
+
+    Instances of one prototype share the first, but may be bound to other materials or inherit other colours.
+    """
+    prim = draw.prim
+    key = [canonical_path(prim)]
+    key += [path for path, _ in bindings(prim) if path is not None]
+    if prim.IsInstanceProxy():
+        api = UsdGeom.PrimvarsAPI(prim)
+        for name in ("displayColor", "displayOpacity"):
+            primvar = api.FindPrimvarWithInheritance(name)
+            if primvar:
+                key.append(canonical_path(primvar.GetAttr().GetPrim()).AppendProperty(primvar.GetAttr().GetName()))
+    return tuple(key)
+
+
+def _metres_per_unit(stage: Usd.Stage, log: WarningLog) -> float:
+    metres = float(UsdGeom.GetStageMetersPerUnit(stage))
+    if not (np.isfinite(metres) and metres > 0.0):
+        log.add(f"metersPerUnit is {metres}, 0.01 is used", "/")
+        return 0.01
+    return metres

@@ -1,0 +1,49 @@
+#version 450
+// Core front to back, then the tail, then the background (METHOD 2). Linear RGB out.
+// TAIL: -1 none (the pool holds every fragment), else as in tail.glsl.
+layout(std430, binding = 0) readonly buffer Offsets { uint offset[]; };  // [P+1]
+layout(std430, binding = 2) readonly buffer Colours { uint colour[]; };
+layout(binding = 0) uniform sampler2D background;
+#if TAIL >= 0
+layout(binding = 1) uniform sampler2D tail_colour;
+layout(binding = 2) uniform sampler2D tail_opacity;
+#endif
+uniform int width;
+layout(location = 0) out vec4 out_colour;
+
+const uint EMPTY = 0xFFFFFFFFu;
+
+void main() {
+    ivec2 xy = ivec2(gl_FragCoord.xy);
+    int p = xy.y * width + xy.x;
+    vec3 rgb = vec3(0.0);
+    float transmittance = 1.0;
+    for (uint i = offset[p], end = offset[p + 1]; i < end; ++i) {
+        uint word = colour[i];
+        if (word == EMPTY) break;  // the pixel has fewer fragments than slots
+        vec3 root = vec3(word & 255u, word >> 8 & 255u, word >> 16 & 255u) / 255.0;
+        float a = float(word >> 24) / 255.0;
+        rgb += transmittance * a * root * root;
+        transmittance *= 1.0 - a;
+    }
+    vec3 behind = texelFetch(background, xy, 0).rgb;
+    behind *= behind;
+#if TAIL >= 0
+    vec4 sums = texelFetch(tail_colour, xy, 0);
+    vec4 opacity = texelFetch(tail_opacity, xy, 0);
+    if (opacity.z > 0.0) {
+        vec3 average = sums.rgb / sums.a;
+#if TAIL == 0 || TAIL == 1
+        float through = exp(-opacity.x);  // P = prod (1 - a)
+#else
+        float through = pow(max(1.0 - opacity.y / opacity.z, 0.0), opacity.z);  // P = (1 - A/t)^t
+#endif
+#if TAIL == 3
+        behind = average + through * behind;  // as DHOIT prints it
+#else
+        behind = (1.0 - through) * average + through * behind;
+#endif
+    }
+#endif
+    out_colour = vec4(rgb + transmittance * behind, 1.0);
+}

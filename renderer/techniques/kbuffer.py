@@ -1,0 +1,21 @@
+"""`kbuffer`: one k for every pixel of the window (Bavoil et al. 2007), with a tail."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from renderer.frame import Frame
+from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.chain import render_chain
+
+
+class KBuffer:
+    """Fixed k = floor(F / (W H)); a pixel's unused slots stay empty, as in a fixed array."""
+
+    name = "kbuffer"
+
+    def render(self, frame: Frame, budget: Budget) -> Rendered:
+        """Render a frame with the same number of slots everywhere."""
+        n = frame.count()
+        slots = np.full(frame.pixels, budget.fragments // frame.pixels, dtype=np.int32)
+        return render_chain(frame, slots, n, budget, before=("count",))

@@ -1,0 +1,38 @@
+"""`kbuffer-importance`: k(p) from importance maps (Vasilakis et al. 2017, "VKB"), budget filled without waste."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from renderer.allocation.fill import budget_fill, feasible_k_min
+from renderer.allocation.importance import VkbOptions, vkb_importance
+from renderer.frame import Clock, Frame
+from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.chain import render_chain
+
+
+class KBufferImportance:
+    """Depth complexity, periphery, Fresnel and noise.
+
+    Args:
+        options: Which factors, and their constants.
+    """
+
+    name = "kbuffer-importance"
+
+    def __init__(self, options: VkbOptions | None = None) -> None:
+        self._options = options or VkbOptions()
+
+    def render(self, frame: Frame, budget: Budget) -> Rendered:
+        """Render a frame with slots by importance."""
+        n = frame.count()
+        gathered = frame.gather(full=True)
+        assert gathered.nearest_facing is not None, "a full gather has the nearest fragment"
+        clock = Clock(frame.ctx)
+        with clock.measure("importance"):
+            facing = np.frombuffer(gathered.nearest_facing.read(4 * frame.pixels), dtype=np.uint32).astype(np.uint8)
+            weights = vkb_importance(n, facing, frame.width, frame.height, self._options)
+            slots = budget_fill(weights, n, budget.fragments, feasible_k_min(n, budget.fragments))
+        rendered = render_chain(frame, slots, n, budget, before=("count", "gather"))
+        rendered.passes.update(clock.passes)
+        return rendered

@@ -1,0 +1,1 @@
+"""Reading of USD stages: one small module for each kind of prim."""

@@ -1,0 +1,90 @@
+"""Primvars as attributes of a mesh, at every interpolation, indexed or not, inherited or not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pxr import Sdf, Tf, Usd, UsdGeom
+
+from renderer.usd.stage import WarningLog
+from renderer.usd.topology import Attribute, Domain, Topology
+
+DOMAINS: dict[str, Domain] = {
+    "constant": "constant",
+    "uniform": "uniform",
+    "vertex": "vertex",
+    "varying": "vertex",
+    "faceVarying": "corner",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class PrimvarReader:
+    """Reads primvars of one prim at one time.
+
+    Attributes:
+        prim: The gprim; constant primvars are inherited from its ancestors.
+        topology: The mesh whose faces, points and corners the values belong to.
+        time: The time to read at.
+        log: Gets a line for every primvar that does not fit.
+    """
+
+    prim: Usd.Prim
+    topology: Topology
+    time: Usd.TimeCode
+    log: WarningLog
+
+    def read(self, name: str, width: int) -> Attribute | None:
+        """The primvar `name` as float32 rows of `width` numbers; None where it is absent, empty or does not fit."""
+        primvar = UsdGeom.PrimvarsAPI(self.prim).FindPrimvarWithInheritance(name)
+        if not primvar or not primvar.HasValue():
+            return None
+        try:
+            values = primvar.ComputeFlattened(self.time)
+        except Tf.ErrorException:
+            values = None
+        if values is None:
+            self.log.add(f"primvar {name} has no value that can be read", self.prim.GetPath())
+            return None
+        return self.fit(name, values, str(primvar.GetInterpolation()), width)
+
+    def texture_coordinates(self) -> str | None:
+        """Name of the first primvar of the prim itself that can serve as texture coordinates."""
+        for primvar in UsdGeom.PrimvarsAPI(self.prim).GetPrimvarsWithValues():
+            kind = primvar.GetTypeName()
+            if kind in (Sdf.ValueTypeNames.TexCoord2fArray, Sdf.ValueTypeNames.Float2Array):
+                return str(primvar.GetPrimvarName())
+        return None
+
+    def fit(self, name: str, values: object, interpolation: str, width: int) -> Attribute | None:
+        """Raw values as an attribute; None, with a warning, where shape or length do not fit the mesh."""
+        rows = as_rows(values, width)
+        domain = DOMAINS.get(interpolation, "constant")
+        if rows is None or len(rows) == 0:
+            return None
+        wanted = self.topology.rows(domain)
+        if len(rows) != wanted and domain == "constant":
+            rows = rows[:1]
+        elif len(rows) != wanted:
+            self.log.add(
+                f"{name} has {len(rows)} values where its interpolation {interpolation} needs {wanted}; ignored",
+                self.prim.GetPath(),
+            )
+            return None
+        if not np.all(np.isfinite(rows)):
+            self.log.add(f"{name} has values that are not finite; ignored", self.prim.GetPath())
+            return None
+        return Attribute(rows, domain)
+
+
+def as_rows(values: object, width: int) -> NDArray[np.float32] | None:
+    """A value or array of values as float32 [n, width]; None if it does not have that shape."""
+    try:
+        array = np.asarray(values, dtype=np.float32)
+    except (TypeError, ValueError):
+        return None
+    if array.ndim <= 1 and array.size % width == 0 and (width == 1 or array.size == width):
+        return array.reshape(-1, width)
+    return array if array.ndim == 2 and array.shape[1] == width else None

@@ -1,0 +1,144 @@
+"""Opening of a stage: errors that a user can act on, composition warnings, variants, time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from pxr import Tf, Usd, UsdUtils
+
+from schemas.problem import ExitCode, Problem
+
+USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
+
+
+class WarningLog:
+    """Collects what was not supported or was missing; the same reason on many prims makes one line."""
+
+    def __init__(self) -> None:
+        self._paths: dict[str, list[str]] = {}
+
+    def add(self, reason: str, path: object) -> None:
+        """Notes that `reason` holds for the prim, layer or texture at `path`."""
+        paths = self._paths.setdefault(reason, [])
+        text = str(path)
+        if text not in paths[-1:]:
+            paths.append(text)
+
+    def lines(self) -> tuple[str, ...]:
+        """One line for each reason, naming the first path and the number of others."""
+        return tuple(
+            f"{reason}: {paths[0]}" + (f" (and {len(paths) - 1} more)" if len(paths) > 1 else "")
+            for reason, paths in self._paths.items()
+        )
+
+
+@contextmanager
+def usd_diagnostics(log: WarningLog) -> Iterator[None]:
+    """Keeps the library's own warnings off stderr and puts them, without addresses, into `log`."""
+    delegate = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        yield
+    finally:
+        for diagnostic in delegate.TakeUncoalescedDiagnostics():
+            text = str(diagnostic.commentary).strip()
+            text = re.sub(r" \((instantiating|recomposing|getting).*? stage .*$", "", text, flags=re.DOTALL)
+            if ".mtlx@" in text:
+                # The material reader reads these documents itself, and reports those that it cannot.
+                continue
+            text = re.sub(r"(Could not open asset @[^@]*@).*$", r"\1", text, flags=re.DOTALL)
+            where = re.match(r"In <([^>]+)>: (.*)$", text, flags=re.DOTALL)
+            if where:
+                log.add(where.group(2), where.group(1))
+            else:
+                log.add("USD says", re.sub(r"<?0x[0-9a-f]+>?", "", text))
+
+
+def check_file(path: Path) -> None:
+    """Raises Problem if `path` is not a readable file with a USD suffix."""
+    if not path.exists():
+        raise Problem(f"There is no file {path}.", "Check the path of the scene.", ExitCode.NOT_FOUND)
+    if path.is_dir():
+        raise Problem(f"{path} is a folder.", "Name the USD file in it that is the root layer.", ExitCode.USAGE)
+    if path.suffix.lower() not in USD_SUFFIXES:
+        raise Problem(
+            f"{path} is not a USD file.",
+            "Give a .usd, .usda, .usdc or .usdz file.",
+            ExitCode.USAGE,
+        )
+    if path.stat().st_size == 0:
+        raise Problem(f"{path} is empty.", "Export the scene again.", ExitCode.USAGE)
+
+
+def open_stage(path: Path, variants: tuple[str, ...] = ()) -> Usd.Stage:
+    """Opens a stage with all payloads.
+
+    Args:
+        path: A .usd, .usda, .usdc or .usdz file.
+        variants: Selections `set=choice` (every prim that has the set) or `/prim/path:set=choice`.
+
+    Raises:
+        Problem: The file is missing or cannot be parsed, or a variant does not exist.
+    """
+    check_file(path)
+    try:
+        stage = Usd.Stage.Open(str(path.resolve()), Usd.Stage.LoadAll)
+    except Tf.ErrorException as error:
+        raise Problem(
+            f"{path} cannot be read as USD: {_reason(error)}.",
+            "Open it with usdview or usdcat, or export it again.",
+            ExitCode.USAGE,
+        ) from error
+    for selection in variants:
+        _select_variant(stage, selection)
+    return stage
+
+
+def stage_time(stage: Usd.Stage, time: float | None) -> Usd.TimeCode:
+    """The one time at which every attribute is read.
+
+    An attribute without time samples has its default value at any time; one that is authored at time samples
+    only has no value at the default time, so the stage's start time is used unless the user names a time.
+    """
+    if time is not None:
+        return Usd.TimeCode(time)
+    if stage.HasAuthoredTimeCodeRange():
+        return Usd.TimeCode(stage.GetStartTimeCode())
+    return Usd.TimeCode.EarliestTime()
+
+
+def _reason(error: Exception) -> str:
+    """The innermost quoted message of a Tf error, on one line, without addresses."""
+    messages = re.findall(r" : '(.*?)'\s*$", str(error), flags=re.MULTILINE | re.DOTALL)
+    text = messages[0] if messages else str(error)
+    return re.sub(r"\s+", " ", text).strip().rstrip(".")[:300]
+
+
+def _select_variant(stage: Usd.Stage, selection: str) -> None:
+    where, _, rest = selection.rpartition(":")
+    name, equals, choice = rest.partition("=")
+    if not equals or not name:
+        raise Problem(
+            f"'{selection}' is not a variant selection.",
+            "Write it as set=choice or /prim/path:set=choice.",
+            ExitCode.USAGE,
+        )
+    found: dict[str, list[str]] = {}
+    applied = False
+    with Usd.EditContext(stage, stage.GetSessionLayer()):
+        # The list is made first: a selection changes the prims that a running traversal would visit.
+        for prim in list(stage.TraverseAll()):
+            if where and str(prim.GetPath()) != where:
+                continue
+            for set_name in prim.GetVariantSets().GetNames() if prim else ():
+                found[set_name] = list(prim.GetVariantSet(set_name).GetVariantNames())
+                if set_name == name and choice in found[set_name]:
+                    prim.GetVariantSet(name).SetVariantSelection(choice)
+                    applied = True
+    if not applied:
+        known = "; ".join(f"{key}={'|'.join(values)}" for key, values in sorted(found.items())) or "none"
+        raise Problem(
+            f"The scene has no variant '{selection}'.", f"Choose from what is there: {known}.", ExitCode.NOT_FOUND
+        )

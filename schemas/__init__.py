@@ -1,0 +1,1 @@
+"""What travels between the stages: scenes, views, fragment dumps, label shards, bundles, measurements."""

@@ -1,0 +1,72 @@
+#!/usr/bin/env bash
+# Makes .venv with everything in requirements.lock, and sees to it that an OpenGL context can be made.
+# Safe to run again: with an unchanged lock and pyproject.toml it does nothing.
+# PYTHON names another interpreter (3.11 or later).
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+say() { printf 'setup: %s\n' "$*" >&2; }
+die() { say "$*"; exit 1; }
+
+apt_install() { # why, packages...
+    local why=$1; shift
+    command -v apt-get >/dev/null || die "$why, and there is no apt-get here: install the equivalent of '$*' and run this again."
+    local root=()
+    if [ "$(id -u)" -ne 0 ]; then
+        command -v sudo >/dev/null || die "$why: run 'apt-get install $*' as root, then run this again."
+        root=(sudo)
+    fi
+    say "$why: installing $* with apt-get."
+    "${root[@]}" env DEBIAN_FRONTEND=noninteractive sh -c \
+        'apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@" >/dev/null' sh "$@"
+}
+
+find_python() {
+    local candidate
+    for candidate in ${PYTHON:-python3.11 python3.12 python3.13 python3}; do
+        if "$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+            command -v "$candidate"
+            return
+        fi
+    done
+    die "Python 3.11 or later is needed: install it, or name it with PYTHON=/path/to/python."
+}
+
+make_venv() {
+    local python version
+    python=$(find_python)
+    if ! "$python" -c 'import ensurepip, venv' 2>/dev/null; then
+        version=$("$python" -c 'import sys; print(f"{sys.version_info.major}.{sys.version_info.minor}")')
+        apt_install "Python's venv module is missing" "python$version-venv"
+    fi
+    say "making .venv with $python"
+    "$python" -m venv --clear .venv
+}
+
+install_packages() {
+    say "installing the locked dependencies (about 6 GB on disk on Linux x86-64: PyTorch brings its CUDA libraries)"
+    if command -v uv >/dev/null; then
+        uv pip install --quiet --python .venv/bin/python --require-hashes -r requirements.lock
+        uv pip install --quiet --python .venv/bin/python --no-deps --no-build-isolation -e .
+    else
+        .venv/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+        .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+    fi
+}
+
+context_works() { .venv/bin/python -m renderer.context; }
+
+ensure_context() {
+    context_works >/dev/null 2>&1 && return
+    apt_install "no OpenGL context can be made" libegl1 libgl1 libgl1-mesa-dri libegl-mesa0
+    context_works >&2 || die "an OpenGL context still cannot be made; the reason stands above."
+}
+
+# The folder is part of the stamp because a virtual environment does not survive being moved.
+stamp=$({ pwd; cat requirements.lock pyproject.toml scripts/setup.sh; } | sha256sum | cut -d' ' -f1)
+[ "$(cat .venv/.stamp 2>/dev/null)" = "$stamp" ] && exit 0
+make_venv
+install_packages
+ensure_context
+echo "$stamp" >.venv/.stamp
+say "ready"

@@ -1,0 +1,1 @@
+"""What ties the stages together: pipeline, artifact store, registry, report and command line."""

@@ -1,0 +1,103 @@
+"""The commands and how they end.
+
+Exit statuses are those of `schemas.problem.ExitCode`: an error says what is wrong and what to do, never a traceback.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+from typing import NoReturn
+
+import typer
+from typer.exceptions import Abort, Exit, TyperException
+
+from schemas.problem import ExitCode, Problem
+from services.cli import build, models, output, samples
+from services.cli.state import DEFAULT_STATE, STATE_VARIABLE
+
+app = typer.Typer(
+    name="diaphane",
+    help="Learns where a renderer should spend a fixed budget of transparent fragments.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.command("build")(build.build)
+app.command("samples")(samples.samples)
+app.add_typer(models.app, name="models")
+
+
+@app.command("version")
+def version(as_json: bool = typer.Option(False, "--json", help="One JSON object on stdout.")) -> None:
+    """Version of Diaphane and of the libraries that can change a result."""
+    from services.versions import library_versions
+
+    versions = library_versions()
+    if as_json:
+        output.print_json(versions)
+        return
+    for name, value in versions.items():
+        print(f"{name} {value}")
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Entry point of `diaphane`: runs a command and exits with its status."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    sys.exit(run(given))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Runs a command; returns its exit status.
+
+    Args:
+        arguments: What stands after `diaphane` on the command line.
+    """
+    as_json = "--json" in arguments
+    output.set_up_logging()
+    signal.signal(signal.SIGTERM, _terminate)
+    try:
+        status = _call(arguments)
+    except TyperException as error:
+        return _usage(error, as_json)
+    except Problem as problem:
+        return output.show_problem(problem, as_json=as_json)
+    except BrokenPipeError:
+        # Whoever read our output has left, as `head` does; nothing more can be written, not even at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return int(ExitCode.CHECK_FAILED)
+    except Exception as error:
+        state = Path(os.environ.get(STATE_VARIABLE, DEFAULT_STATE))
+        return output.show_problem(output.unexpected(error, state), as_json=as_json)
+    if status == ExitCode.INTERRUPTED:
+        stopped = Problem("Stopped.", f"Continue with: {shlex.join(['diaphane', *arguments])}", ExitCode.INTERRUPTED)
+        return output.show_problem(stopped, as_json=as_json)
+    return status
+
+
+def _call(arguments: Sequence[str]) -> int:
+    try:
+        status = typer.main.get_command(app).main(args=list(arguments), prog_name="diaphane", standalone_mode=False)
+    except Exit as exit_:
+        return exit_.exit_code
+    except (KeyboardInterrupt, Abort):
+        return ExitCode.INTERRUPTED
+    return int(status or 0)  # typer itself gives 130 for an interrupt within a command
+
+
+def _usage(error: TyperException, as_json: bool) -> int:
+    text = error.format_message()
+    if not text:  # no command was named: the help has been printed
+        return int(ExitCode.USAGE)
+    command = getattr(getattr(error, "ctx", None), "command_path", "diaphane")
+    problem = Problem(text[0].upper() + text[1:].rstrip(".") + ".", f"See `{command} --help`.", ExitCode.USAGE)
+    return output.show_problem(problem, as_json=as_json)
+
+
+def _terminate(_signal: int, _frame: FrameType | None) -> NoReturn:
+    raise KeyboardInterrupt

@@ -1,0 +1,103 @@
+"""`diaphane build`: the main job."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from schemas.tail import DENSITY_G
+from services.cli import output
+from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
+
+if TYPE_CHECKING:
+    from services.options import BuildOptions
+    from services.result import BuildResult
+
+
+def build(
+    scenes: Annotated[list[Path], typer.Argument(help="USD files: .usd, .usda, .usdc, .usdz.")],
+    name: Annotated[str, typer.Option("--name", help="Name of the bundle in the registry.")],
+    budgets: Annotated[
+        str, typer.Option("--budgets", help="Fragments of a frame, as multiples of width x height.")
+    ] = "1,2,4",
+    alpha: Annotated[float | None, typer.Option("--alpha", help="Opacity that every surface gets, in (0, 1).")] = None,
+    holdout: Annotated[
+        list[Path] | None,
+        typer.Option("--holdout", help="Scene to evaluate on and never train on; repeatable. Default: a quarter."),
+    ] = None,
+    views: Annotated[Path | None, typer.Option("--views", help="JSON file with the views of the scenes.")] = None,
+    views_per_scene: Annotated[
+        int, typer.Option("--views-per-scene", help="Views sampled of a scene that has no cameras.")
+    ] = 3,
+    size: Annotated[str, typer.Option("--size", help="Width and height of the pictures, pixels.")] = "1430x960",
+    tail: Annotated[
+        str, typer.Option("--tail", help="density, exact-coverage, weighted-average or paper.")
+    ] = "density",
+    g: Annotated[float, typer.Option("--g", help="Steepness of the density tail.")] = DENSITY_G,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of everything drawn at random.")] = 0,
+    steps: Annotated[int | None, typer.Option("--steps", help="Optimiser steps. Default: the trainer's.")] = None,
+    state: StateOption = DEFAULT_STATE,
+    as_json: JsonOption = False,
+) -> None:
+    """Render, label, train, evaluate, publish and report. The same command again continues, or finds it all done."""
+    from services.options import BuildOptions, parse_budgets, parse_size, parse_tail
+    from services.progress import make_progress
+
+    width, height = parse_size(size)
+    options = BuildOptions(
+        scenes=tuple(scenes),
+        name=name,
+        budgets=parse_budgets(budgets),
+        holdout=tuple(holdout or ()),
+        alpha=alpha,
+        views=views,
+        views_per_scene=views_per_scene,
+        width=width,
+        height=height,
+        tail=parse_tail(tail),
+        g=g,
+        seed=seed,
+        steps=steps,
+        state=state,
+    )
+    # The pipeline loads torch and numba: only once the options are known to be good.
+    from services import pipeline
+
+    result = pipeline.build(options, make_progress(sys.stderr, silent=as_json))
+    if as_json:
+        output.print_json(result.model_dump(mode="json"))
+    else:
+        _show(options, result)
+
+
+def _show(options: BuildOptions, result: BuildResult) -> None:
+    from rich.table import Table
+
+    from services import summary
+
+    console = output.out()
+    held_out = [m for m in result.measurements if m.scene in result.held_out]
+    if held_out:
+        table = Table(title=f"Held out: {', '.join(result.held_out)}", title_justify="left")
+        for heading in ("F / (W H)", "technique"):
+            table.add_column(heading)
+        for heading in ("MSE x1e-5", "/ VKB", "PSNR dB", "FLIP", "ms"):
+            table.add_column(heading, justify="right")
+        for row in summary.rows(held_out):
+            scaled = None if row.mse is None else row.mse * 1e5
+            values = (scaled, row.over_baseline, row.psnr, row.flip, row.ms)
+            cells = [summary.number(value) for value in values]
+            table.add_row(summary.number(row.budget_factor), summary.title(row.technique), *cells)
+        console.print(table)
+        console.print(summary.sentence(held_out), markup=False)
+    else:
+        console.print("No scene was held out, so nothing is proven: give a second scene.", markup=False)
+    if not result.worked:
+        console.print("Nothing had to be done: every artifact was there already.", markup=False)
+    console.print(f"{result.registry.reference}: {result.registry.reason}", markup=False)
+    console.print(f"Bundle: {result.registry.folder}", markup=False)
+    console.print(f"Report: {result.report}", markup=False)
+    console.print(f"[dim]{result.seconds:.1f} s, seed {options.seed}[/]")

@@ -1,0 +1,195 @@
+"""What a user can ask `diaphane build` for, checked before any work starts.
+
+Rules:
+- every scene exists and is named once; held-out scenes are among the scenes, and at least one is left to train on;
+- budgets are positive multiples of width * height fragments;
+- whatever does not hold is a `Problem` that names the option and says what to change.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from schemas.problem import ExitCode, Problem
+from schemas.tail import DENSITY_G, TAILS, TailName
+from services.registry import check_name
+
+MIN_SIDE = 16
+MAX_PIXELS = 7680 * 4320
+"""Pictures beyond 8K are refused: a view's fragments would not fit in memory."""
+MAX_BUDGET = 4096.0
+MAX_VIEWS = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class BuildOptions:
+    """Everything that decides the outcome of a build.
+
+    Attributes:
+        scenes: USD files, in the order given.
+        name: Name of the bundle in the registry.
+        budgets: Fragments of a frame as multiples of width * height, ascending, without duplicates.
+        holdout: Those of `scenes` that are evaluated on and never trained on. Empty: chosen by `default_holdout`.
+        alpha: Opacity in (0, 1) that every surface gets; None keeps the materials' own.
+        views: JSON file with views; None: the stage's cameras, else sampled ones.
+        views_per_scene: How many views are sampled of a scene without cameras of its own.
+        width: Pixels per row.
+        height: Rows.
+        tail: How the fragments beyond k are averaged (METHOD.md section 2).
+        g: Steepness of the density tail.
+        seed: Seed of everything drawn at random: views, sampled pixels, weights, batches.
+        steps: Optimiser steps; None: the trainer's default.
+        state: Folder of artifacts, registry and reports.
+
+    Raises:
+        Problem: An option is out of range, or a scene is missing or named twice.
+    """
+
+    scenes: tuple[Path, ...]
+    name: str
+    budgets: tuple[float, ...] = (1.0, 2.0, 4.0)
+    holdout: tuple[Path, ...] = ()
+    alpha: float | None = None
+    views: Path | None = None
+    views_per_scene: int = 3
+    width: int = 1430
+    height: int = 960
+    tail: TailName = "density"
+    g: float = DENSITY_G
+    seed: int = 0
+    steps: int | None = None
+    state: Path = field(default=Path(".diaphane"))
+
+    def __post_init__(self) -> None:
+        check_name(self.name)
+        _check_scenes(self.scenes)
+        _check_numbers(self)
+        object.__setattr__(self, "budgets", tuple(sorted(set(self.budgets))))
+        object.__setattr__(self, "holdout", _resolve_holdout(self.holdout, self.scenes))
+        if self.views is not None and not self.views.is_file():
+            raise Problem(
+                f"There is no views file {self.views}.", "Check the path given to --views.", ExitCode.NOT_FOUND
+            )
+
+    @property
+    def training(self) -> tuple[Path, ...]:
+        """The scenes that are trained on: all that are not held out."""
+        return tuple(scene for scene in self.scenes if scene not in self.holdout)
+
+    @property
+    def labels(self) -> dict[Path, str]:
+        """A unique short name of every scene: its stem, with as many parent folders as tell it from the others."""
+        labels: dict[Path, str] = {}
+        for scene in self.scenes:
+            parts = scene.resolve().with_suffix("").parts
+            depth = next(d for d in range(1, len(parts) + 1) if _is_unique(parts[-d:], self.scenes))
+            labels[scene] = "/".join(parts[-depth:])
+        return labels
+
+
+def parse_budgets(text: str) -> tuple[float, ...]:
+    """Comma-separated budgets, as in `1,2,4`.
+
+    Raises:
+        Problem: An entry is not a number.
+    """
+    try:
+        return tuple(float(part) for part in text.split(",") if part.strip())
+    except ValueError:
+        raise Problem(f"--budgets '{text}' is not a list of numbers.", "Write it like --budgets 1,2,4.") from None
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Width and height in pixels, as in `1430x960`.
+
+    Raises:
+        Problem: It is not two whole numbers with an x between them.
+    """
+    width, x, height = text.lower().partition("x")
+    if not (x and width.isascii() and width.isdigit() and height.isascii() and height.isdigit()):
+        raise Problem(f"--size '{text}' is not a size in pixels.", "Write it like --size 1430x960.")
+    return int(width), int(height)
+
+
+def parse_tail(text: str) -> TailName:
+    """The tail of that name.
+
+    Raises:
+        Problem: There is none.
+    """
+    for tail in TAILS:
+        if tail == text:
+            return tail
+    raise Problem(f"There is no tail '{text}'.", f"Use one of {', '.join(TAILS)}: --tail density.")
+
+
+def default_holdout(scenes: Sequence[Path]) -> tuple[Path, ...]:
+    """A quarter of the scenes, at least one; none of a single scene. The choice depends on their names alone."""
+    if len(scenes) < 2:
+        return ()
+    ranked = sorted(scenes, key=lambda scene: hashlib.sha256(scene.stem.encode()).hexdigest())
+    chosen = set(ranked[: max(1, len(scenes) // 4)])
+    return tuple(scene for scene in scenes if scene in chosen)
+
+
+def _is_unique(tail: tuple[str, ...], scenes: Sequence[Path]) -> bool:
+    return sum(scene.resolve().with_suffix("").parts[-len(tail) :] == tail for scene in scenes) == 1
+
+
+def _check_scenes(scenes: tuple[Path, ...]) -> None:
+    if not scenes:
+        raise Problem("No scene was given.", "Name at least one USD file: diaphane build SCENE.usdc --name NAME.")
+    for scene in scenes:
+        if scene.is_dir():
+            raise Problem(f"{scene} is a folder.", "Name the USD file in it.")
+        if not scene.is_file():
+            raise Problem(f"There is no file {scene}.", "Check the path.", ExitCode.NOT_FOUND)
+    # Two files that differ in the suffix alone (a.usda, a.usdc) could not be told apart in tables either.
+    twice = [path for path, n in Counter(scene.resolve().with_suffix("") for scene in scenes).items() if n > 1]
+    if twice:
+        raise Problem(f"The scene {twice[0].name} is given more than once ({twice[0]}).", "Name each scene once.")
+
+
+def _check_numbers(o: BuildOptions) -> None:
+    if not o.budgets:
+        raise Problem("No budget was given.", "Give at least one: --budgets 1,2,4.")
+    for budget in o.budgets:
+        if not (math.isfinite(budget) and 0.0 < budget <= MAX_BUDGET):
+            raise Problem(
+                f"A budget of {budget:g} fragments per pixel cannot be used.",
+                f"Budgets are multiples of width x height, above 0 and at most {MAX_BUDGET:g}: --budgets 1,2,4.",
+            )
+        if budget * o.width * o.height < 1.0:
+            raise Problem(f"A budget of {budget:g} is less than one fragment.", "Give a larger one: --budgets 1,2,4.")
+    _require(o.alpha is None or 0.0 < o.alpha < 1.0, f"--alpha {o.alpha}", "is not between 0 and 1 (both excluded)")
+    _require(min(o.width, o.height) >= MIN_SIDE, f"--size {o.width}x{o.height}", f"is below {MIN_SIDE} pixels a side")
+    _require(o.width * o.height <= MAX_PIXELS, f"--size {o.width}x{o.height}", f"is beyond {MAX_PIXELS} pixels")
+    _require(1 <= o.views_per_scene <= MAX_VIEWS, f"--views-per-scene {o.views_per_scene}", f"is not 1..{MAX_VIEWS}")
+    _require(math.isfinite(o.g) and 0.0 <= o.g <= 10.0, f"--g {o.g}", "is not between 0 and 10")
+    _require(0 <= o.seed < 2**63, f"--seed {o.seed}", "is not a whole number from 0 to 2^63 - 1")
+    _require(o.steps is None or o.steps >= 1, f"--steps {o.steps}", "is not positive")
+
+
+def _require(holds: bool, option: str, fault: str) -> None:
+    if not holds:
+        raise Problem(f"{option} {fault}.", "Change that option.")
+
+
+def _resolve_holdout(wanted: tuple[Path, ...], scenes: tuple[Path, ...]) -> tuple[Path, ...]:
+    if not wanted:
+        return default_holdout(scenes)
+    chosen: set[Path] = set()
+    for entry in wanted:
+        matches = [s for s in scenes if s.resolve() == entry.resolve()] or [s for s in scenes if s.stem == str(entry)]
+        if len(matches) != 1:
+            fault = "is not among the scenes" if not matches else "names more than one of the scenes"
+            raise Problem(f"The held-out scene {entry} {fault}.", "Name it in both places, by the same path.")
+        chosen.add(matches[0])
+    if len(chosen) == len(scenes):
+        raise Problem("Every scene is held out, so none is left to train on.", "Hold out fewer, or add scenes.")
+    return tuple(scene for scene in scenes if scene in chosen)

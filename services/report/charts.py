@@ -1,0 +1,206 @@
+"""Charts as inline SVG. Colours are CSS variables, so that the page's light and dark themes reach into them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+from schemas.measurement import TrainingPoint
+from services.summary import ORACLE, Row, number, technique_order, title
+
+Corners = Sequence[tuple[float, float]]
+
+_STAR_RADII = (1.0, 0.45)
+MARKS: dict[str, tuple[float, Corners]] = {
+    "kbuffer": (4.5, [(-1, -1), (1, -1), (1, 1), (-1, 1)]),
+    "kbuffer-dynamic": (6.0, [(0, -1), (1, 0), (0, 1), (-1, 0)]),
+    "kbuffer-importance": (6.5, [(0, -1), (0.9, 0.7), (-0.9, 0.7)]),
+    "kbuffer-optimal": (
+        7.5,
+        [
+            (_STAR_RADII[i % 2] * math.sin(i * math.pi / 5), -_STAR_RADII[i % 2] * math.cos(i * math.pi / 5))
+            for i in range(10)
+        ],
+    ),
+}
+"""Radius (SVG units) and corners (units of it) of each technique's mark; techniques without an entry get a disc."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """The plotting area in SVG units and the value ranges of its axes (positive; shown on log axes if `log_*`)."""
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    log_x: bool = True
+    log_y: bool = True
+    width: float = 520.0
+    height: float = 340.0
+    left: float = 64.0
+    right: float = 18.0
+    top: float = 14.0
+    bottom: float = 48.0
+
+    def px(self, value: float) -> float:
+        """Horizontal position of a value."""
+        return self.left + _fraction(value, self.x, self.log_x) * (self.width - self.left - self.right)
+
+    def py(self, value: float) -> float:
+        """Vertical position of a value; up is more."""
+        return self.height - self.bottom - _fraction(value, self.y, self.log_y) * (self.height - self.top - self.bottom)
+
+
+def log_ticks(low: float, high: float) -> list[float]:
+    """Powers of ten within the range, with round values between them where there is room; at most eight ticks."""
+    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    for steps in ((1, 1.5, 2, 3, 4, 5, 6, 8), (1, 2, 3, 5), (1, 2, 5), (1, 3), (1,)):
+        ticks = [s * 10.0**d for d in decades for s in steps if low <= s * 10.0**d * (1 + 1e-9) <= high * (1 + 2e-9)]
+        if len(ticks) <= 8:
+            return ticks
+    stride = math.ceil(len(ticks) / 8)
+    return ticks[::stride]
+
+
+def linear_ticks(low: float, high: float) -> list[float]:
+    """About five round values within the range."""
+    step = 10.0 ** math.floor(math.log10((high - low) / 5.0))
+    step *= next(s for s in (1.0, 2.0, 5.0, 10.0) if (high - low) / (step * s) <= 6.0)
+    return [i * step for i in range(math.ceil(low / step), math.floor(high / step) + 1)]
+
+
+def pareto_front(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """The points that no other beats or equals in both coordinates (less is better), by the first coordinate."""
+    front: list[tuple[float, float]] = []
+    for x, y in sorted(set(points)):
+        if not front or y < front[-1][1]:
+            front.append((x, y))
+    return front
+
+
+def time_error_chart(rows: Sequence[Row], label: str) -> str:
+    """Wall time against mse (x1e-5) on log axes, a point for every technique and budget.
+
+    The dashed line is the Pareto front of the techniques that a renderer can run, so without the oracle.
+
+    Rows without time or error are left out; '' if none is left.
+    """
+    points = {(r.technique, r.budget_factor): (r.ms, r.mse * 1e5) for r in rows if r.ms and r.mse}
+    if not points:
+        return ""
+    xs, ys = [x for x, _ in points.values()], [y for _, y in points.values()]
+    frame = Frame(_padded_log(xs, 1.35), _padded_log(ys, 1.8))
+    real = [point for (technique, _), point in points.items() if technique != ORACLE]
+    parts = [_axes(frame, "wall time of a frame, ms", "MSE ×1e-5"), _front(frame, pareto_front(real))]
+    for technique in technique_order(name for name, _ in points):
+        own = sorted((budget, *points[name, budget]) for name, budget in points if name == technique)
+        parts.append(_series(frame, technique, own))
+    return _svg(frame, parts, f"{label}: wall time of a frame against mean squared error, by technique and budget")
+
+
+def training_chart(history: Sequence[TrainingPoint]) -> str:
+    """Training and validation loss by step; '' with fewer than two points."""
+    if len(history) < 2:
+        return ""
+    training = [(float(p.step), p.training) for p in history]
+    validation = [(float(p.step), p.validation) for p in history if p.validation is not None]
+    values = [y for _, y in training + validation]
+    span = (max(values) - min(values)) or max(abs(values[0]), 1.0)
+    steps = (training[0][0], max(training[-1][0], training[0][0] + 1.0))
+    frame = Frame(
+        steps,
+        (min(values) - 0.05 * span, max(values) + 0.05 * span),
+        log_x=False,
+        log_y=False,
+        width=640.0,
+        height=280.0,
+    )
+    parts = [_axes(frame, "step", "mean log(1 + regret)"), _line(frame, training, "line training")]
+    if validation:
+        parts.append(_line(frame, validation, "line validation"))
+    return _svg(frame, parts, "Loss by training step")
+
+
+def legend(techniques: Sequence[str]) -> str:
+    """Marks and titles of techniques in a row, and what the dashed line and the numbers mean."""
+    items = [_key(f"t-{t} mark", 18, _mark(t, 9, 9), title(t)) for t in technique_order(techniques)]
+    items.append(_key("wide", 26, '<path class="front" d="M1 9H25"/>', "Pareto front, without the oracle"))
+    items.append('<span class="key">numbers: F / (W H)</span>')
+    return f'<p class="legend">{"".join(items)}</p>'
+
+
+def _key(css: str, width: int, drawing: str, text: str) -> str:
+    svg = f'<svg class="{escape(css)}" viewBox="0 0 {width} 18" aria-hidden="true">{drawing}</svg>'
+    return f'<span class="key">{svg}{escape(text)}</span>'
+
+
+def _series(frame: Frame, technique: str, points: Sequence[tuple[float, float, float]]) -> str:
+    path = " ".join(f"{frame.px(x):.1f},{frame.py(y):.1f}" for _, x, y in points)
+    marks = "".join(
+        f'<g class="mark">{_mark(technique, frame.px(x), frame.py(y))}'
+        f"<title>{escape(title(technique))}, F = {budget:g} W H: {number(x)} ms, {number(y)}e-5</title></g>"
+        f'<text class="point" x="{frame.px(x) + 8:.1f}" y="{frame.py(y) - 6:.1f}">{budget:g}</text>'
+        for budget, x, y in points
+    )
+    return f'<g class="t-{escape(technique)}"><polyline class="link" points="{path}"/>{marks}</g>'
+
+
+def _front(frame: Frame, front: Sequence[tuple[float, float]]) -> str:
+    return _line(frame, front, "front") if len(front) > 1 else ""
+
+
+def _line(frame: Frame, points: Sequence[tuple[float, float]], css: str) -> str:
+    path = " ".join(f"{frame.px(x):.1f},{frame.py(y):.1f}" for x, y in points)
+    return f'<polyline class="{css}" points="{path}"/>'
+
+
+def _axes(frame: Frame, x_label: str, y_label: str) -> str:
+    left, right = frame.left, frame.width - frame.right
+    top, bottom = frame.top, frame.height - frame.bottom
+    parts = []
+    for value in log_ticks(*frame.x) if frame.log_x else linear_ticks(*frame.x):
+        x = frame.px(value)
+        parts.append(f'<path class="grid" d="M{x:.1f} {top}V{bottom}"/>')
+        parts.append(_text("tick", "middle", x, bottom + 17, _tick(value)))
+    for value in log_ticks(*frame.y) if frame.log_y else linear_ticks(*frame.y):
+        y = frame.py(value)
+        parts.append(f'<path class="grid" d="M{left} {y:.1f}H{right}"/>')
+        parts.append(_text("tick", "end", left - 7, y + 4, _tick(value)))
+    parts.append(f'<path class="axis" d="M{left} {top}V{bottom}H{right}"/>')
+    parts.append(_text("label", "middle", (left + right) / 2, frame.height - 10, x_label))
+    turned = _text("label", "middle", 0, 0, y_label)
+    parts.append(f'<g transform="translate(15 {(top + bottom) / 2}) rotate(-90)">{turned}</g>')
+    return "".join(parts)
+
+
+def _text(css: str, anchor: str, x: float, y: float, text: str) -> str:
+    return f'<text class="{css}" text-anchor="{anchor}" x="{x:.1f}" y="{y:.1f}">{escape(text)}</text>'
+
+
+def _svg(frame: Frame, parts: Sequence[str], description: str) -> str:
+    size = f"{frame.width:g} {frame.height:g}"
+    return (
+        f'<svg class="chart" viewBox="0 0 {size}" role="img" aria-label="{escape(description)}">{"".join(parts)}</svg>'
+    )
+
+
+def _mark(technique: str, x: float, y: float) -> str:
+    if technique not in MARKS:
+        return f'<circle cx="{x:.1f}" cy="{y:.1f}" r="5.5"/>'
+    radius, corners = MARKS[technique]
+    points = " ".join(f"{x + radius * dx:.1f},{y + radius * dy:.1f}" for dx, dy in corners)
+    return f'<polygon points="{points}"/>'
+
+
+def _fraction(value: float, span: tuple[float, float], log: bool) -> float:
+    low, high = span
+    return math.log(value / low) / math.log(high / low) if log else (value - low) / (high - low)
+
+
+def _padded_log(values: Sequence[float], factor: float) -> tuple[float, float]:
+    return min(values) / factor, max(values) * factor
+
+
+def _tick(value: float) -> str:
+    return f"{value:g}" if value == 0 or 1e-4 < abs(value) < 1e6 else f"{value:.0e}"

@@ -1,0 +1,1 @@
+"""One module a stage of the main job: what it makes and from what. `services.pipeline` orders them."""

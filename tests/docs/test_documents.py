@@ -1,0 +1,122 @@
+"""The documents are complete and true: options, commands, folders, links, dependencies."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer.main
+
+from services.cli.app import app
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("schemas", "renderer", "labeller", "trainer", "services")
+DOCUMENTS = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md")
+
+DISTRIBUTIONS = {"PIL": "pillow", "pxr": "usd-core", "flip_evaluator": "flip-evaluator"}
+"""Import names that differ from the name of the distribution."""
+
+
+def read(name: str) -> str:
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def commands() -> dict[str, Any]:
+    """Every command by the words that call it."""
+    found: dict[str, Any] = {}
+
+    def visit(command: Any, words: str) -> None:
+        inner = getattr(command, "commands", None)
+        if inner is None:
+            found[words] = command
+            return
+        for name, child in inner.items():
+            visit(child, f"{words} {name}")
+
+    visit(typer.main.get_command(app), "diaphane")
+    return found
+
+
+@pytest.mark.parametrize("words", sorted(commands()))
+def test_every_command_is_in_the_readme(words: str) -> None:
+    assert words in read("README.md")
+
+
+def test_the_table_of_options_is_complete_and_has_the_true_defaults() -> None:
+    table = dict(re.findall(r"^\| `(--[a-z-]+)` \| (.*?) \|", read("README.md"), re.MULTILINE))
+    options = {
+        option.opts[0]: option for option in commands()["diaphane build"].params if option.opts[0].startswith("--")
+    }
+    assert set(table) == set(options)
+    for name, cell in table.items():
+        if literal := re.fullmatch(r"`(.*)`", cell):
+            assert literal[1] == str(options[name].default)
+
+
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_links_lead_to_files(document: str) -> None:
+    targets = re.findall(r"\]\(([^)#:]+)\)", read(document))
+    assert [target for target in targets if not (ROOT / target).exists()] == []
+
+
+def test_every_folder_is_in_the_architecture() -> None:
+    listed = set(re.findall(r"^\| `([a-z./_-]+)/` \|", read("ARCHITECTURE.md"), re.MULTILINE))
+    tracked = {path.parent.relative_to(ROOT) for name in PACKAGES for path in (ROOT / name).rglob("*.py")}
+    folders = {path.as_posix() for path in tracked} | {"scripts", "tests", ".ci"}
+    assert folders <= listed
+    assert all((ROOT / name).is_dir() for name in listed)
+
+
+def test_every_make_target_in_the_documents_exists() -> None:
+    targets = set(re.findall(r"^([a-z]+):", read("Makefile"), re.MULTILINE))
+    named = {
+        name for document in DOCUMENTS for name in re.findall(r"(?:^|`)make ([a-z]+)", read(document), re.MULTILINE)
+    }
+    assert {"quickstart", "test"} <= named <= targets
+
+
+def test_the_lock_holds_hashes_and_no_addresses() -> None:
+    lock = read("requirements.lock")
+    assert "://" not in lock
+    entries = [entry for entry in re.split(r"\n(?=\S)", lock.strip()) if not entry.startswith("#")]
+    assert entries
+    assert all(re.match(r"[a-z0-9.-]+==\S+", entry) and "--hash=sha256:" in entry for entry in entries)
+
+
+def test_every_declared_dependency_is_locked() -> None:
+    locked = set(re.findall(r"^([a-z0-9.-]+)==", read("requirements.lock"), re.MULTILINE))
+    assert declared() <= locked
+
+
+def declared() -> set[str]:
+    project = tomllib.loads(read("pyproject.toml"))["project"]
+    groups = [project["dependencies"], *project["optional-dependencies"].values()]
+    names = {re.split(r"[\[<>=! ]", requirement)[0] for group in groups for requirement in group}
+    return names - {"diaphane"}
+
+
+def test_every_import_is_declared() -> None:
+    known = declared() | set(PACKAGES) | sys.stdlib_module_names
+    missing = set()
+    for path in (path for name in PACKAGES for path in (ROOT / name).rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names: list[str] = []
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                names = [node.module]
+            tops = {name.partition(".")[0] for name in names}
+            missing |= {(path.name, top) for top in tops if DISTRIBUTIONS.get(top, top) not in known}
+    assert missing == set()
+
+
+@pytest.mark.parametrize("script", ["scripts/setup.sh", "scripts/lock.sh", ".ci/run"])
+def test_scripts_are_executable_and_parse(script: str) -> None:
+    assert (ROOT / script).stat().st_mode & 0o111
+    subprocess.run(["bash", "-n", str(ROOT / script)], check=True)

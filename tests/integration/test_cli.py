@@ -1,0 +1,298 @@
+"""The command line as users meet it: output, errors and exit statuses. The pipeline behind `build` is replaced here."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from support.measured import example
+
+import services
+from schemas.measurement import RegistryResult
+from schemas.problem import ExitCode, Problem
+from services.cli.app import run
+from services.options import BuildOptions
+from services.progress import Progress
+from services.registry import Registry
+from services.result import BuildResult
+
+Build = Callable[[BuildOptions, Progress], BuildResult]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("DIAPHANE_STATE", raising=False)
+    for name in ("bottles", "foliage"):
+        (tmp_path / f"{name}.usda").write_text("#usda 1.0\n")
+    return tmp_path
+
+
+@pytest.fixture
+def pipeline(monkeypatch: pytest.MonkeyPatch) -> Callable[[Build], list[BuildOptions]]:
+    """Puts a function in the pipeline's place; returns the options that it was called with."""
+
+    def put(build: Build) -> list[BuildOptions]:
+        asked: list[BuildOptions] = []
+
+        def spy(options: BuildOptions, progress: Progress) -> BuildResult:
+            asked.append(options)
+            return build(options, progress)
+
+        module = ModuleType("services.pipeline")
+        vars(module)["build"] = spy
+        monkeypatch.setitem(sys.modules, "services.pipeline", module)
+        monkeypatch.setattr(services, "pipeline", module, raising=False)
+        return asked
+
+    return put
+
+
+def succeed(options: BuildOptions, progress: Progress) -> BuildResult:
+    with progress.stage("render", 1) as stage:
+        stage.advance()
+    return BuildResult(
+        report=options.state / "report.html",
+        registry=RegistryResult(
+            reference=f"{options.name}@1.0.0", folder="folder", champion=True, reason="It is the first version."
+        ),
+        held_out=("bottles",),
+        measurements=tuple(example()),
+        skipped={"views": 2},
+        worked=False,
+        seconds=1.5,
+    )
+
+
+def raising(error: BaseException) -> Build:
+    def build(options: BuildOptions, progress: Progress) -> BuildResult:
+        raise error
+
+    return build
+
+
+ROOT = Path(services.__file__).parent.parent
+BUILD = ["build", "bottles.usda", "foliage.usda", "--name", "glass", "--budgets", "1,2"]
+
+
+def test_help_answers_at_once() -> None:
+    command = [sys.executable, "-c", "from services.cli import main; main(['--help'])"]
+    # Processor time, because the wall time of a busy machine says little.
+    assert min(_processor_seconds(command) for _ in range(3)) < 0.5
+
+
+def _processor_seconds(command: list[str]) -> float:
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, check=True, capture_output=True, cwd=ROOT)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+
+
+def test_help_loads_nothing_heavy() -> None:
+    heavy = ("torch", "numba", "moderngl", "pxr", "numpy", "pydantic")
+    code = f"import sys, services.cli; print([m for m in {heavy} if m in sys.modules])"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert answer.stdout.strip() == "[]"
+
+
+def test_build_passes_its_options_on(pipeline: Callable[[Build], list[BuildOptions]]) -> None:
+    asked = pipeline(succeed)
+    options = ["--alpha", "0.33", "--holdout", "bottles.usda", "--size", "64x48", "--tail", "paper", "--g", "0.5"]
+    options += ["--seed", "7", "--steps", "9", "--views-per-scene", "2", "--state", "state"]
+    assert run([*BUILD, *options]) == ExitCode.OK
+    assert asked == [
+        BuildOptions(
+            scenes=(Path("bottles.usda"), Path("foliage.usda")),
+            name="glass",
+            budgets=(1.0, 2.0),
+            holdout=(Path("bottles.usda"),),
+            alpha=0.33,
+            views_per_scene=2,
+            width=64,
+            height=48,
+            tail="paper",
+            g=0.5,
+            seed=7,
+            steps=9,
+            state=Path("state"),
+        )
+    ]
+
+
+def test_the_options_of_the_command_line_default_to_those_of_the_library(
+    pipeline: Callable[[Build], list[BuildOptions]],
+) -> None:
+    asked = pipeline(succeed)
+    run(["build", "bottles.usda", "foliage.usda", "--name", "glass"])
+    assert asked == [BuildOptions((Path("bottles.usda"), Path("foliage.usda")), "glass")]
+
+
+def test_build_prints_the_table_and_where_the_report_is(
+    pipeline: Callable[[Build], list[BuildOptions]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    pipeline(succeed)
+    assert run(BUILD) == ExitCode.OK
+    captured = capsys.readouterr()
+    assert "Report: .diaphane/report.html" in captured.out
+    assert "this bundle" in captured.out
+    assert "Nothing had to be done" in captured.out
+    assert "render: 1" in captured.err
+
+
+def test_json_is_one_object_on_stdout_and_nothing_else(
+    pipeline: Callable[[Build], list[BuildOptions]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    pipeline(succeed)
+    assert run([*BUILD, "--json"]) == ExitCode.OK
+    captured = capsys.readouterr()
+    result = json.loads(captured.out)
+    assert result["registry"]["reference"] == "glass@1.0.0"
+    assert result["skipped"] == {"views": 2}
+    assert captured.err == ""
+
+
+def test_the_state_folder_comes_from_the_environment(
+    pipeline: Callable[[Build], list[BuildOptions]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DIAPHANE_STATE", "elsewhere")
+    asked = pipeline(succeed)
+    run(BUILD)
+    assert asked[0].state == Path("elsewhere")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "words"),
+    [
+        (["build", "nowhere.usda", "--name", "glass"], ExitCode.NOT_FOUND, "no file nowhere.usda"),
+        ([*BUILD, "--budgets", "0"], ExitCode.USAGE, "A budget of 0 "),
+        ([*BUILD, "--budgets", "one"], ExitCode.USAGE, "not a list of numbers"),
+        ([*BUILD, "--size", "big"], ExitCode.USAGE, "is not a size"),
+        ([*BUILD, "--alpha", "2"], ExitCode.USAGE, "--alpha 2.0"),
+        ([*BUILD, "--alpha", "much"], ExitCode.USAGE, "'--alpha'"),
+        ([*BUILD, "--name", "../x"], ExitCode.USAGE, "cannot be the name"),
+        ([*BUILD, "--colour"], ExitCode.USAGE, "--colour"),
+        (["build", "bottles.usda"], ExitCode.USAGE, "--name"),
+        (["paint"], ExitCode.USAGE, "paint"),
+        (["models", "show", "glass"], ExitCode.NOT_FOUND, "no bundle 'glass'"),
+    ],
+)
+def test_mistakes_end_with_what_to_do(
+    arguments: list[str], status: ExitCode, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(arguments) == status
+    captured = capsys.readouterr()
+    assert words in captured.err
+    assert len(captured.err.strip().splitlines()) == 2
+    assert captured.out == ""
+    assert run([*arguments, "--json"]) == status
+    problem = json.loads(capsys.readouterr().err)
+    assert problem["code"] == status
+    assert words in problem["title"]
+    assert problem["remedy"]
+
+
+def test_a_problem_of_the_pipeline_ends_with_its_status(
+    pipeline: Callable[[Build], list[BuildOptions]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    pipeline(raising(Problem("bottles.usda is opaque.", "Give --alpha 0.33.", ExitCode.CHECK_FAILED)))
+    assert run(BUILD) == ExitCode.CHECK_FAILED
+    assert capsys.readouterr().err == "error: bottles.usda is opaque.\nGive --alpha 0.33.\n"
+
+
+def test_an_interrupt_says_how_to_continue(
+    pipeline: Callable[[Build], list[BuildOptions]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    pipeline(raising(KeyboardInterrupt()))
+    assert run([*BUILD, "--views-per-scene", "2"]) == ExitCode.INTERRUPTED
+    command = "diaphane build bottles.usda foliage.usda --name glass --budgets 1,2 --views-per-scene 2"
+    assert f"Continue with: {command}" in capsys.readouterr().err
+
+
+def test_an_unexpected_error_is_short_and_its_traceback_is_kept(
+    pipeline: Callable[[Build], list[BuildOptions]], capsys: pytest.CaptureFixture[str], folder: Path
+) -> None:
+    pipeline(raising(ZeroDivisionError("division by zero")))
+    assert run(BUILD) == ExitCode.CHECK_FAILED
+    captured = capsys.readouterr()
+    assert "Traceback" not in captured.err
+    assert "ZeroDivisionError: division by zero" in captured.err
+    (path,) = (folder / ".diaphane" / "errors").iterdir()
+    assert path.name in captured.err
+    assert "Traceback" in path.read_text()
+
+
+def test_no_command_prints_the_help(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([]) == ExitCode.USAGE
+    captured = capsys.readouterr()
+    assert "build" in captured.out + captured.err
+
+
+def test_version_names_the_libraries(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["version", "--json"]) == ExitCode.OK
+    assert set(json.loads(capsys.readouterr().out)) >= {"diaphane", "python", "numpy"}
+    assert run(["version"]) == ExitCode.OK
+    assert "numpy " in capsys.readouterr().out
+
+
+def publish(folder: Path, weights: str, score: float | None) -> None:
+    bundle = folder / f"bundle-{weights}"
+    bundle.mkdir()
+    (bundle / "manifest.json").write_text(weights)
+    registry = Registry(folder / ".diaphane" / "registry")
+    publication = registry.publish("glass", bundle, score, {})
+    champion = registry.champion("glass")
+    registry.consider(publication, score, champion.score if champion else None)
+
+
+def test_models_are_listed_shown_and_promoted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["models", "list"]) == ExitCode.OK
+    assert "No bundle is published" in capsys.readouterr().err
+    publish(folder, "a", 0.5)
+    publish(folder, "b", None)
+    assert run(["models", "list"]) == ExitCode.OK
+    assert capsys.readouterr().out == "glass  latest 1.1.0  champion 1.0.0\n"
+    assert run(["models", "promote", "glass", "1.1.0", "--reason", "smaller"]) == ExitCode.OK
+    assert run(["models", "show", "glass"]) == ExitCode.OK
+    shown = capsys.readouterr().out
+    assert "glass@1.0.0  score 0.5" in shown
+    assert "glass@1.1.0  score none" in shown
+    assert "champion: 1.0.0 -> 1.1.0" in shown
+    assert "smaller" in shown
+    assert run(["models", "list", "--json"]) == ExitCode.OK
+    assert json.loads(capsys.readouterr().out)["bundles"] == [{"name": "glass", "latest": "1.1.0", "champion": "1.1.0"}]
+    assert run(["models", "show", "glass@1.0.0", "--json"]) == ExitCode.OK
+    (version,) = json.loads(capsys.readouterr().out)["versions"]
+    assert version["score"] == 0.5
+    assert Path(version["folder"]).is_dir()
+
+
+def test_a_real_interrupt_ends_with_130(tmp_path: Path) -> None:
+    code = (
+        "import sys, time, types, services\n"
+        "module = types.ModuleType('services.pipeline')\n"
+        "def build(options, progress):\n"
+        "    with progress.stage('render', 9):\n"
+        "        time.sleep(60)\n"
+        "module.build = build\n"
+        "services.pipeline = sys.modules['services.pipeline'] = module\n"
+        f"from services.cli import main; main({BUILD!r})\n"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    child = subprocess.Popen(
+        [sys.executable, "-c", code], cwd=tmp_path, env=environment, stderr=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    assert child.stderr is not None
+    assert child.stderr.readline() == b"render: 9\n"
+    child.send_signal(signal.SIGINT)
+    _, err = child.communicate(timeout=20)
+    assert child.returncode == ExitCode.INTERRUPTED
+    assert b"Continue with: diaphane build" in err
+    assert b"Traceback" not in err

@@ -1,0 +1,63 @@
+"""Synthetic training data: the rows of random dumps, as the labeller would write them."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from labeller.allocate import allocate
+from labeller.curves import error_curves
+from labeller.hull import lower_hulls
+from renderer.features import FEATURES, derive, gather
+from support.dumps import random_dump
+from trainer.dataset import ViewData, make_view
+from trainer.weights import Layer, Weights
+
+
+def random_view(asset: str, seed: int, size: int = 40, max_n: int = 12) -> ViewData:
+    """Every pixel of a random dump with more than one fragment; scored at 1/4 and 1/2 of its fragments."""
+    dump = random_dump(size, size, max_n, seed)
+    curves = error_curves(dump)
+    hulls = lower_hulls(curves, 1)
+    budgets = [dump.total // 4, dump.total // 2]
+    prices = [math.log(found.lam or 1e-9) for found in allocate(dump, curves, budgets, "optimal", hulls)]
+    rows = np.flatnonzero(dump.counts > 1)
+    sizes = np.diff(hulls.offsets)[rows]
+    offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    vertices = np.arange(offsets[-1]) + np.repeat(hulls.offsets[rows] - offsets[:-1], sizes)
+    return make_view(
+        asset,
+        features=derive(gather(dump))[rows],
+        n=dump.counts[rows].astype(np.int32),
+        k_min=1,
+        hull=(offsets, hulls.k[vertices], hulls.error[vertices]),
+        price_range=(min(prices) - 1.0, max(prices) + 1.0),
+        anchors=prices,
+        sampled_pixels=float(dump.pixels),
+    )
+
+
+def random_weights(seed: int, features: tuple[str, ...] = FEATURES, hidden: tuple[int, ...] = (32, 16)) -> Weights:
+    """A network whose outputs have the size that trained ones have."""
+    rng = np.random.default_rng(seed)
+    sizes = (len(features), *hidden, 2)
+    layers: list[Layer] = [
+        (
+            rng.normal(0.0, 1.5 / math.sqrt(fan_in), (fan_out, fan_in)).astype(np.float32),
+            rng.normal(0.0, 0.3, fan_out).astype(np.float32),
+        )
+        for fan_in, fan_out in pairwise(sizes)
+    ]
+    layers[-1][1][0] = -8.0
+    mean = rng.normal(0.0, 0.5, len(features)).astype(np.float32)
+    std = rng.uniform(0.05, 1.0, len(features)).astype(np.float32)
+    return Weights(features, mean, std, tuple(layers))
+
+
+def real_features(rows: int, seed: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
+    """float32 [rows, 26], features of the pixels of a random dump that have fragments."""
+    side = math.ceil(math.sqrt(1.2 * rows)) + 1
+    dump = random_dump(side, side, 10, seed)
+    return derive(gather(dump))[dump.counts > 0][:rows]

@@ -1,0 +1,126 @@
+"""Options: what cannot work is refused before any work, with words that help."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from schemas.problem import ExitCode, Problem
+from services.options import BuildOptions, default_holdout, parse_budgets, parse_size, parse_tail
+
+
+@pytest.fixture
+def scenes(tmp_path: Path) -> tuple[Path, ...]:
+    paths = tuple(tmp_path / f"{name}.usda" for name in ("bottles", "foliage", "knots", "voxels"))
+    for path in paths:
+        path.write_text("#usda 1.0\n")
+    return paths
+
+
+def test_budgets_are_sorted_and_unique(scenes: tuple[Path, ...]) -> None:
+    assert BuildOptions(scenes, "glass", budgets=(4.0, 1.0, 4.0)).budgets == (1.0, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"budgets": ()}, "No budget"),
+        ({"budgets": (0.0,)}, "A budget of 0 "),
+        ({"budgets": (1.0, -2.0)}, "A budget of -2 "),
+        ({"budgets": (float("nan"),)}, "A budget of nan "),
+        ({"budgets": (float("inf"),)}, "A budget of inf "),
+        ({"budgets": (1e-9,)}, "less than one fragment"),
+        ({"alpha": 0.0}, "--alpha 0.0 is not between 0 and 1"),
+        ({"alpha": 1.0}, "--alpha 1.0 is not between 0 and 1"),
+        ({"alpha": float("nan")}, "--alpha nan"),
+        ({"width": 8}, "below 16 pixels"),
+        ({"width": 100000, "height": 1000}, "beyond 33177600 pixels"),
+        ({"views_per_scene": 0}, "--views-per-scene 0"),
+        ({"g": -1.0}, "--g -1.0"),
+        ({"g": float("nan")}, "--g nan"),
+        ({"seed": -1}, "--seed -1"),
+        ({"steps": 0}, "--steps 0"),
+        ({"name": "Glass!"}, "'Glass!' cannot be the name"),
+        ({"holdout": (Path("teapot"),)}, "teapot is not among the scenes"),
+        ({"views": Path("nowhere.json")}, "no views file nowhere.json"),
+    ],
+)
+def test_options_out_of_range_are_problems(change: dict[str, Any], words: str, scenes: tuple[Path, ...]) -> None:
+    with pytest.raises(Problem) as caught:
+        BuildOptions(**{"scenes": scenes, "name": "glass", **change})
+    assert words in caught.value.title
+    assert caught.value.remedy
+
+
+def test_a_missing_scene_ends_with_not_found(scenes: tuple[Path, ...]) -> None:
+    with pytest.raises(Problem, match=r"no file nowhere\.usda") as caught:
+        BuildOptions((*scenes, Path("nowhere.usda")), "glass")
+    assert caught.value.code == ExitCode.NOT_FOUND
+
+
+def test_no_scene_and_a_folder_are_problems(tmp_path: Path) -> None:
+    with pytest.raises(Problem, match="No scene"):
+        BuildOptions((), "glass")
+    with pytest.raises(Problem, match="is a folder"):
+        BuildOptions((tmp_path,), "glass")
+
+
+@pytest.mark.parametrize("second", ["./bottles.usda", "bottles.usdc"])
+def test_a_scene_given_twice_is_a_problem(second: str, scenes: tuple[Path, ...], tmp_path: Path) -> None:
+    (tmp_path / "bottles.usdc").write_text("")
+    with pytest.raises(Problem, match="more than once"):
+        BuildOptions((*scenes, tmp_path / second), "glass")
+
+
+@pytest.mark.parametrize("by_stem", [True, False])
+def test_held_out_scenes_are_named_by_path_or_stem(by_stem: bool, scenes: tuple[Path, ...]) -> None:
+    wanted = Path("knots") if by_stem else scenes[2].parent / "." / "knots.usda"
+    options = BuildOptions(scenes, "glass", holdout=(wanted,))
+    assert options.holdout == (scenes[2],)
+    assert options.training == (scenes[0], scenes[1], scenes[3])
+
+
+def test_holding_out_everything_is_a_problem(scenes: tuple[Path, ...]) -> None:
+    with pytest.raises(Problem, match="none is left to train on"):
+        BuildOptions(scenes, "glass", holdout=scenes)
+
+
+def test_a_stem_that_two_scenes_have_is_ambiguous(scenes: tuple[Path, ...], tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    twin = tmp_path / "sub" / "bottles.usda"
+    twin.write_text("")
+    with pytest.raises(Problem, match="more than one of the scenes"):
+        BuildOptions((*scenes, twin), "glass", holdout=(Path("bottles"),))
+    options = BuildOptions((*scenes, twin), "glass", holdout=(twin,))
+    assert options.holdout == (twin,)
+    assert options.labels[twin] == "sub/bottles"
+    assert options.labels[scenes[0]] == f"{tmp_path.name}/bottles"
+    assert options.labels[scenes[1]] == "foliage"
+
+
+def test_a_quarter_is_held_out_by_default_whatever_the_order(scenes: tuple[Path, ...]) -> None:
+    assert len(default_holdout(scenes)) == 1
+    assert default_holdout(scenes) == default_holdout(scenes[::-1])
+    assert default_holdout(scenes[:1]) == ()
+    assert BuildOptions(scenes, "glass").holdout == default_holdout(scenes)
+
+
+def test_texts_are_parsed__yes() -> None:
+    assert parse_budgets("1,2.5, 4") == (1.0, 2.5, 4.0)
+    assert parse_size("1430x960") == (1430, 960)
+    assert parse_tail("paper") == "paper"
+
+
+@pytest.mark.parametrize("text", ["", "1430", "1430x", "x960", "1430 x 960x2", "-1x2", "1.5x2"])
+def test_sizes_are_parsed__no(text: str) -> None:
+    with pytest.raises(Problem, match="is not a size"):
+        parse_size(text)
+
+
+def test_other_texts_are_parsed__no() -> None:
+    with pytest.raises(Problem, match="not a list of numbers"):
+        parse_budgets("1;2")
+    with pytest.raises(Problem, match="no tail 'dense'"):
+        parse_tail("dense")

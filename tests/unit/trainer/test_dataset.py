@@ -1,0 +1,145 @@
+"""Hull segments, batches and normalisation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from support.dumps import random_dump
+from support.training import random_view
+
+from labeller.curves import error_curves
+from labeller.hull import lower_hulls
+from labeller.shards import read_shard, write_shard
+from renderer.features import FEATURES
+from schemas.problem import Problem
+from trainer.dataset import GROUP, SEGMENTS, ViewData, load_shards, make_view, normalisation, sample_batch
+
+
+def view_of(hulls: list[tuple[list[int], list[float]]], prices: tuple[float, float] = (-9.0, -1.0)) -> ViewData:
+    offsets = np.concatenate([[0], np.cumsum([len(k) for k, _ in hulls])]).astype(np.int64)
+    return make_view(
+        "one",
+        features=np.zeros((len(hulls), len(FEATURES)), np.float32),
+        n=np.array([max(k, default=2) + 1 for k, _ in hulls], np.int32),
+        k_min=1,
+        hull=(
+            offsets,
+            np.concatenate([np.array(k, np.int32) for k, _ in hulls]),
+            np.concatenate([np.array(e, np.float32) for _, e in hulls]),
+        ),
+        price_range=prices,
+        anchors=[],
+        sampled_pixels=1.0,
+    )
+
+
+def convex_hull(vertices: int) -> tuple[list[int], list[float]]:
+    return list(range(1, vertices + 1)), [float((vertices - k) ** 2) for k in range(1, vertices + 1)]
+
+
+def test_segments_are_the_slopes_between_the_vertices() -> None:
+    view = view_of([([1, 3, 4], [1.0, 0.5, 0.0]), ([], []), ([1, 2], [0.25, 0.0])])
+    np.testing.assert_array_equal(view.offsets, [0, 2, 2, 3])
+    np.testing.assert_allclose(view.slopes, [0.25, 0.5, 0.25])
+    np.testing.assert_array_equal(view.lengths, [2, 1, 1])
+
+
+def hull_errors(view: ViewData, k: NDArray[np.float64]) -> NDArray[np.float64]:
+    ks = 1.0 + np.concatenate([[0.0], np.cumsum(view.lengths)])
+    drops = (view.slopes * view.lengths).astype(np.float64)
+    return np.interp(k, ks, drops.sum() - np.concatenate([[0.0], np.cumsum(drops)]))
+
+
+def test_long_hulls_are_simplified_from_above_and_stay_convex() -> None:
+    ks, errors = convex_hull(90)
+    view = view_of([(ks, errors)])
+    assert len(view.slopes) == SEGMENTS
+    assert (np.diff(view.slopes) < 0.0).all()
+    assert view.lengths.sum() == 89
+    simplified = hull_errors(view, np.arange(1.0, 91.0))
+    assert (simplified >= np.array(errors) - 1e-3).all()
+    assert (simplified - np.array(errors)).max() < 0.002 * errors[0]
+
+
+def test_prices_below_the_lossless_error_are_not_drawn() -> None:
+    steep = ([1, 2, 3, 4], [1.0, 1e-1, 1e-6, 0.0])
+    view = replace(view_of([steep] * 4, prices=(-40.0, -1.0)))
+    assert np.log(1e-6) - 1.0 < view.price_range[0] < 0.0
+    assert view.price_range[1] == -1.0
+
+
+def test_a_batch_is_the_same_for_the_same_seed_and_differs_by_step() -> None:
+    views = [random_view("a", 1), random_view("b", 2)]
+    first, again, other = (sample_batch(views, [0, 3], (7, step), 4 * GROUP) for step in (5, 5, 6))
+    np.testing.assert_array_equal(first.features, again.features)
+    np.testing.assert_array_equal(first.log_lambda, again.log_lambda)
+    assert not np.array_equal(first.log_lambda, other.log_lambda)
+
+
+def test_a_batch_holds_the_rows_hulls() -> None:
+    view = random_view("a", 3)
+    batch = sample_batch([view], list(range(26)), (0, 0), GROUP)
+    for i in range(GROUP):
+        row = np.flatnonzero((view.features == batch.features[i]).all(axis=1))[0]
+        part = slice(view.offsets[row], view.offsets[row + 1])
+        np.testing.assert_array_equal(batch.slopes[i, : len(view.slopes[part])], view.slopes[part])
+        assert batch.lengths[i].sum() == view.lengths[part].sum()
+        assert batch.n[i] == view.n[row]
+
+
+def test_assets_are_drawn_equally_often_however_many_views_they_have() -> None:
+    rare = random_view("rare", 1)
+    rare.features[:, 0] = -1.0
+    views = [rare, *(random_view("common", seed) for seed in range(2, 7))]
+    drawn = np.concatenate([sample_batch(views, [0], (0, step), 8 * GROUP).features[:, 0] for step in range(40)])
+    assert 0.4 < (drawn == -1.0).mean() < 0.6
+
+
+def test_normalisation_weighs_assets_equally() -> None:
+    one, two = random_view("one", 1), random_view("two", 2)
+    one.features[:], two.features[:] = 0.0, 1.0
+    mean, std = normalisation([one, two, two, two])
+    np.testing.assert_allclose(mean, 0.5)
+    np.testing.assert_allclose(std, 0.5)
+
+
+def test_shards_become_views(tmp_path: Path) -> None:
+    dump = random_dump(60, 40, 9, seed=1)
+    curves = error_curves(dump)
+    path = tmp_path / "view.safetensors"
+    write_shard(path, dump, curves, lower_hulls(curves, 1), [dump.total // 3], fraction=0.5, seed=2)
+    shard = read_shard(path)
+    (view,) = load_shards([path], ["box"])
+    assert view.asset == "box"
+    assert view.k_min == 1
+    np.testing.assert_array_equal(view.features, shard.features)
+    np.testing.assert_allclose(view.anchors, shard.anchors)
+    row = int(np.argmax(view.n))
+    part = slice(view.offsets[row], view.offsets[row + 1])
+    hull = slice(shard.hull_offsets[row], shard.hull_offsets[row + 1])
+    gained = (view.slopes[part] * view.lengths[part]).sum()
+    assert gained == pytest.approx(shard.hull_error[hull][0] - shard.hull_error[hull][-1], rel=1e-5)
+
+
+def test_shards_of_single_layers_are_refused(tmp_path: Path) -> None:
+    dump = random_dump(8, 8, 1, seed=1)
+    curves = error_curves(dump)
+    write_shard(tmp_path / "flat", dump, curves, lower_hulls(curves, 1), [10])
+    with pytest.raises(Problem, match="nothing to learn"):
+        load_shards([tmp_path / "flat"], ["flat"])
+
+
+def test_a_subset_keeps_rows_and_hulls_together() -> None:
+    view = random_view("a", 4)
+    part = view.subset(50, seed=0)
+    assert part.rows == 50
+    assert part.sampled_pixels == pytest.approx(view.sampled_pixels * 50 / view.rows)
+    for i in (0, 17, 49):
+        row = np.flatnonzero((view.features == part.features[i]).all(axis=1))[0]
+        np.testing.assert_array_equal(
+            part.slopes[part.offsets[i] : part.offsets[i + 1]], view.slopes[view.offsets[row] : view.offsets[row + 1]]
+        )

@@ -1,0 +1,318 @@
+"""Label shards as training data: hull segments in CSR form, prices per view, and batches padded on the fly."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from labeller.shards import Shard, read_shard
+from schemas.problem import ExitCode, Problem
+
+SEGMENTS: Final = 24
+"""Hull segments per pixel; longer hulls are simplified to this many."""
+
+GROUP: Final = 128
+"""Rows of a batch that share a view and a price."""
+
+ANCHOR_SHARE: Final = 0.5
+"""How often a group's price is near a budget that is scored."""
+
+ANCHOR_SPREAD: Final = 0.3
+"""Standard deviation of log lambda around such a budget's."""
+
+LOSSLESS_MSE: Final = 1e-7
+"""Mean squared error per channel that counts as none."""
+
+NEGLIGIBLE: Final = 0.1
+"""Share of the lossless error below which the optimum's error is not worth a lower price."""
+
+
+@dataclass(frozen=True)
+class ViewData:
+    """Rows of one shard.
+
+    Attributes:
+        asset: What the view shows; assets are weighted equally.
+        features: float32 [R, 26], columns `renderer.features.FEATURES`.
+        n: float32 [R], fragments.
+        k_min: Fewest core fragments.
+        offsets: int64 [R+1], segments of row r are `offsets[r]:offsets[r+1]`.
+        slopes: float32 [S], error gained per fragment, > 0, falling in a row.
+        lengths: float32 [S], fragments of a segment.
+        price_range: Natural logarithms of the least and the greatest lambda that are drawn.
+        anchors: float64 [A], log lambda at the budgets that are scored (W * H * {1, 2, 4}), may be empty.
+        price_grid: float64 [G], log lambda, rising.
+        scale_grid: float64 [G], mean over the rows of `(E* + lossless) / lambda` at those prices: the scale of the
+            regret, E* the optimum's error.
+        sampled_pixels: Pixels of the image that the rows stand for.
+    """
+
+    asset: str
+    features: NDArray[np.float32]
+    n: NDArray[np.float32]
+    k_min: int
+    offsets: NDArray[np.int64]
+    slopes: NDArray[np.float32]
+    lengths: NDArray[np.float32]
+    price_range: tuple[float, float]
+    anchors: NDArray[np.float64]
+    price_grid: NDArray[np.float64]
+    scale_grid: NDArray[np.float64]
+    sampled_pixels: float
+
+    @property
+    def rows(self) -> int:
+        """R."""
+        return len(self.n)
+
+    def subset(self, rows: int, seed: int) -> ViewData:
+        """At most `rows` rows, drawn by `seed`; prices and scale stay those of the whole."""
+        if self.rows <= rows:
+            return self
+        chosen = np.sort(np.random.default_rng(seed).choice(self.rows, size=rows, replace=False))
+        starts, counts = self.offsets[chosen], np.diff(self.offsets)[chosen]
+        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        segments = np.arange(offsets[-1]) + np.repeat(starts - offsets[:-1], counts)
+        return replace(
+            self,
+            features=self.features[chosen],
+            n=self.n[chosen],
+            offsets=offsets,
+            slopes=self.slopes[segments],
+            lengths=self.lengths[segments],
+            sampled_pixels=self.sampled_pixels * rows / self.rows,
+        )
+
+    def digest(self) -> bytes:
+        """sha256 over what is trained on."""
+        hasher = hashlib.sha256(self.asset.encode())
+        for array in (self.features, self.n, self.offsets, self.slopes, self.lengths, self.anchors):
+            hasher.update(np.ascontiguousarray(array).tobytes())
+        return hasher.digest()
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Rows of G views, `group` rows each, with one price per row.
+
+    Attributes:
+        features: float32 [B, F].
+        n: float32 [B].
+        k_min: float32 [B].
+        slopes: float32 [B, SEGMENTS], 0 where a hull has ended.
+        lengths: float32 [B, SEGMENTS], 0 where a hull has ended.
+        log_lambda: float32 [B], one price per group.
+        scale: float32 [G], mean of `(E* + lossless) / lambda` of each group's view at its price.
+    """
+
+    features: NDArray[np.float32]
+    n: NDArray[np.float32]
+    k_min: NDArray[np.float32]
+    slopes: NDArray[np.float32]
+    lengths: NDArray[np.float32]
+    log_lambda: NDArray[np.float32]
+    scale: NDArray[np.float32]
+
+
+def lossless_error(pixels: float) -> float:
+    """Squared error, summed over channels, that counts as none on that many pixels."""
+    return LOSSLESS_MSE * 3.0 * pixels
+
+
+def load_shards(paths: Sequence[Path], assets: Sequence[str]) -> list[ViewData]:
+    """Read label shards.
+
+    Args:
+        paths: Shards of `labeller.shards`.
+        assets: The asset of each shard.
+
+    Raises:
+        Problem: No shard has a row that a budget could change.
+    """
+    views = [view_data(read_shard(path), asset) for path, asset in zip(paths, assets, strict=True)]
+    views = [view for view in views if view.rows]
+    if not views:
+        raise Problem(
+            "There is nothing to learn: no pixel's colour depends on the budget.",
+            "Add a scene or a view with several transparent layers.",
+            ExitCode.CHECK_FAILED,
+        )
+    return views
+
+
+def view_data(shard: Shard, asset: str) -> ViewData:
+    """One shard as training data."""
+    return make_view(
+        asset,
+        features=shard.features,
+        n=shard.n,
+        k_min=shard.k_min,
+        hull=(shard.hull_offsets, shard.hull_k, shard.hull_error),
+        price_range=shard.price_range,
+        anchors=shard.anchors,
+        sampled_pixels=shard.sampled_pixels,
+    )
+
+
+def make_view(
+    asset: str,
+    *,
+    features: NDArray[np.float32],
+    n: NDArray[np.int32],
+    k_min: int,
+    hull: tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32]],
+    price_range: tuple[float, float],
+    anchors: Sequence[float],
+    sampled_pixels: float,
+) -> ViewData:
+    """Rows and their hulls as training data.
+
+    Args:
+        asset: What the view shows.
+        features: float32 [R, 26].
+        n: int32 [R], fragments.
+        k_min: Fewest core fragments.
+        hull: Offsets int64 [R+1], k int32 [M] and error float32 [M] of the hulls' vertices.
+        price_range: Natural logarithms of the least and the greatest lambda that matter.
+        anchors: log lambda at the budgets that are scored.
+        sampled_pixels: Pixels of the image that the rows stand for.
+    """
+    offsets, slopes, lengths = _segments(*hull)
+    lossless = lossless_error(sampled_pixels)
+    order = np.argsort(slopes, kind="stable")
+    below = np.concatenate([[0.0], np.cumsum((slopes * lengths).astype(np.float64)[order])])
+    # Prices at which even the optimum is far below what counts as lossless teach nothing.
+    first = int(np.searchsorted(below, NEGLIGIBLE * lossless))
+    if 0 < first < len(below):
+        least = float(np.log(slopes[order][first - 1]))
+        price_range = min(max(price_range[0], least), price_range[1]), price_range[1]
+    grid = np.linspace(price_range[0] - 1.5, price_range[1] + 1.5, 65)
+    optimum = below[np.searchsorted(slopes[order], np.exp(grid), side="right")]
+    return ViewData(
+        asset=asset,
+        features=features,
+        n=n.astype(np.float32),
+        k_min=k_min,
+        offsets=offsets,
+        slopes=slopes,
+        lengths=lengths,
+        price_range=price_range,
+        anchors=np.array(anchors, dtype=np.float64),
+        price_grid=grid,
+        scale_grid=(optimum + lossless) * np.exp(-grid) / max(1, len(n)),
+        sampled_pixels=sampled_pixels,
+    )
+
+
+def sample_batch(views: Sequence[ViewData], columns: Sequence[int], seed: tuple[int, int], size: int) -> Batch:
+    """A batch, the same for the same seed.
+
+    Each group comes from one view (every asset equally often, then every view of it) and has one price: half of
+    the time near one of the budgets that are scored, where the view has any, else anywhere in its range.
+
+    Args:
+        views: The data set.
+        columns: Columns of the features that the model reads.
+        seed: Seed of the training and number of the step.
+        size: Rows; rounded down to whole groups of `GROUP`.
+    """
+    rng = np.random.default_rng(seed)
+    by_asset = _views_by_asset(views)
+    groups = max(1, size // GROUP)
+    features = np.empty((groups * GROUP, len(columns)), dtype=np.float32)
+    n, k_min, log_lambda = (np.empty(groups * GROUP, dtype=np.float32) for _ in range(3))
+    slopes, lengths = (np.zeros((groups * GROUP, SEGMENTS), dtype=np.float32) for _ in range(2))
+    scale = np.empty(groups, dtype=np.float32)
+    for g in range(groups):
+        same = by_asset[rng.integers(len(by_asset))]
+        view = same[rng.integers(len(same))]
+        rows = rng.integers(view.rows, size=GROUP)
+        price = _draw_price(view, rng)
+        part = slice(g * GROUP, (g + 1) * GROUP)
+        features[part] = view.features[rows][:, columns]
+        n[part], k_min[part], log_lambda[part] = view.n[rows], view.k_min, price
+        _pad(view.offsets, view.slopes, view.lengths, rows, slopes[part], lengths[part])
+        scale[g] = np.exp(np.interp(price, view.price_grid, np.log(view.scale_grid)))
+    return Batch(features, n, k_min, slopes, lengths, log_lambda, scale)
+
+
+def normalisation(views: Sequence[ViewData]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Mean and spread of every feature, float32 [26] each; every asset weighs the same, so do its views."""
+    means, squares = [], []
+    for same in _views_by_asset(views):
+        means.append(np.mean([view.features.mean(axis=0, dtype=np.float64) for view in same], axis=0))
+        squares.append(np.mean([np.square(view.features, dtype=np.float64).mean(axis=0) for view in same], axis=0))
+    mean = np.mean(means, axis=0)
+    variance = np.maximum(np.mean(squares, axis=0) - mean * mean, 0.0)
+    return mean.astype(np.float32), np.sqrt(variance).astype(np.float32)
+
+
+def _views_by_asset(views: Sequence[ViewData]) -> list[list[ViewData]]:
+    names = sorted({view.asset for view in views})
+    return [[view for view in views if view.asset == name] for name in names]
+
+
+def _draw_price(view: ViewData, rng: np.random.Generator) -> float:
+    if len(view.anchors) and rng.random() < ANCHOR_SHARE:
+        anchor = max(float(rng.choice(view.anchors)), view.price_range[0])
+        return anchor + float(rng.normal(0.0, ANCHOR_SPREAD))
+    return float(rng.uniform(*view.price_range))
+
+
+@numba.njit(cache=True)
+def _pad(
+    offsets: NDArray[np.int64],
+    slopes: NDArray[np.float32],
+    lengths: NDArray[np.float32],
+    rows: NDArray[np.int64],
+    out_slopes: NDArray[np.float32],
+    out_lengths: NDArray[np.float32],
+) -> None:
+    for i in range(len(rows)):
+        first = offsets[rows[i]]
+        for j in range(offsets[rows[i] + 1] - first):
+            out_slopes[i, j] = slopes[first + j]
+            out_lengths[i, j] = lengths[first + j]
+
+
+@numba.njit(cache=True)
+def _segments(
+    hull_offsets: NDArray[np.int64], hull_k: NDArray[np.int32], hull_error: NDArray[np.float32]
+) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]:
+    """CSR segments (slope, length) of hulls given by their vertices, at most SEGMENTS each.
+
+    Leaving out a vertex replaces two segments by their chord: the hull stays convex and never lies below the
+    true one. The vertex whose removal adds the least area goes first.
+    """
+    rows = len(hull_offsets) - 1
+    offsets = np.zeros(rows + 1, dtype=np.int64)
+    slopes = np.empty(len(hull_k), dtype=np.float32)
+    lengths = np.empty(len(hull_k), dtype=np.float32)
+    used = 0
+    for r in range(rows):
+        k = hull_k[hull_offsets[r] : hull_offsets[r + 1]].astype(np.float64)
+        e = hull_error[hull_offsets[r] : hull_offsets[r + 1]].astype(np.float64)
+        count = len(k)
+        while count > SEGMENTS + 1:
+            best, least = 1, np.inf
+            for j in range(1, count - 1):
+                chord = (k[j] - k[j - 1]) * (e[j + 1] - e[j - 1]) - (e[j] - e[j - 1]) * (k[j + 1] - k[j - 1])
+                if chord < least:
+                    best, least = j, chord
+            k[best : count - 1] = k[best + 1 : count].copy()
+            e[best : count - 1] = e[best + 1 : count].copy()
+            count -= 1
+        for j in range(count - 1):
+            slopes[used] = (e[j] - e[j + 1]) / (k[j + 1] - k[j])
+            lengths[used] = k[j + 1] - k[j]
+            if slopes[used] > 0.0:
+                used += 1
+        offsets[r + 1] = used
+    return offsets, slopes[:used].copy(), lengths[:used].copy()

@@ -1,0 +1,111 @@
+"""How near a predictor's allocations come to the optimum, on the rows of a view. Numpy only, fast.
+
+A budget of the view is scaled to its rows: it is what the optimal allocation spends on them. The errors are those
+of the hulls, so `1` is the best that any allocation could do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.allocation.fill import solve_lambda
+from trainer.dataset import ViewData, lossless_error
+from trainer.weights import Weights
+
+
+@dataclass(frozen=True)
+class BudgetScore:
+    """One view at one budget.
+
+    Attributes:
+        asset: What the view shows.
+        log_lambda: Price at which the optimum spends the budget.
+        budget: Fragments spent on the rows.
+        error: Squared error of the predictor's allocation, summed over rows and channels.
+        optimum: The least error at that budget.
+        ratio: Their quotient, after the error that counts as none was added to both.
+    """
+
+    asset: str
+    log_lambda: float
+    budget: int
+    error: float
+    optimum: float
+    ratio: float
+
+
+def evaluate_view(weights: Weights, view: ViewData, log_lambdas: Sequence[float]) -> list[BudgetScore]:
+    """Compare a predictor with the optimum at the budgets that some prices stand for.
+
+    Args:
+        weights: The predictor.
+        view: Rows of a view.
+        log_lambdas: Natural logarithms of the prices, for example `view.anchors`.
+    """
+    a, b = weights.predict(view.features)
+    n = view.n.astype(np.int32)
+    floor = lossless_error(view.sampled_pixels)
+    scores = []
+    for log_lambda in log_lambdas:
+        budget, optimum = _optimum(view.offsets, view.slopes, view.lengths, view.k_min, float(np.exp(log_lambda)))
+        k, _ = solve_lambda(a, b, n, budget, view.k_min)
+        error = _hull_error(view.offsets, view.slopes, view.lengths, view.k_min, k)
+        ratio = (error + floor) / (optimum + floor)
+        scores.append(BudgetScore(view.asset, float(log_lambda), budget, error, optimum, ratio))
+    return scores
+
+
+def evaluate(weights: Weights, views: Iterable[ViewData]) -> list[BudgetScore]:
+    """Every view at its scored budgets, or in the middle of its price range where it has none."""
+    return [score for view in views for score in evaluate_view(weights, view, scored_prices(view))]
+
+
+def geometric_mean(scores: Sequence[BudgetScore]) -> float:
+    """Geometric mean of the ratios."""
+    return float(np.exp(np.mean([np.log(score.ratio) for score in scores])))
+
+
+def scored_prices(view: ViewData) -> list[float]:
+    """Log prices at which a view is scored."""
+    return [float(price) for price in view.anchors] or [0.5 * sum(view.price_range)]
+
+
+@numba.njit(cache=True)
+def _optimum(
+    offsets: NDArray[np.int64],
+    slopes: NDArray[np.float32],
+    lengths: NDArray[np.float32],
+    k_min: int,
+    price: float,
+) -> tuple[int, float]:
+    """Fragments that the optimum spends on the rows at a price, and the error that is left."""
+    spent, left = float((len(offsets) - 1) * k_min), 0.0
+    for j in range(len(slopes)):
+        if slopes[j] > price:
+            spent += lengths[j]
+        else:
+            left += slopes[j] * lengths[j]
+    return round(spent), left
+
+
+@numba.njit(cache=True)
+def _hull_error(
+    offsets: NDArray[np.int64],
+    slopes: NDArray[np.float32],
+    lengths: NDArray[np.float32],
+    k_min: int,
+    k: NDArray[np.int32],
+) -> float:
+    """Sum over the rows of their hulls at counts k."""
+    total = 0.0
+    for r in range(len(k)):
+        covered = float(k[r] - k_min)
+        for j in range(offsets[r], offsets[r + 1]):
+            total += slopes[j] * max(0.0, lengths[j] - max(0.0, covered))
+            covered -= lengths[j]
+    return total

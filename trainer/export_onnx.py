@@ -1,0 +1,61 @@
+"""The network as ONNX, written node by node: no exporter, no external data, any number of pixels."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import onnx
+from numpy.typing import NDArray
+from onnx import TensorProto, helper, numpy_helper
+
+from schemas.bundle import GAIN_FLOOR
+from trainer.weights import Weights
+
+OPSET: Final = 17
+IR_VERSION: Final = 8
+"""What onnxruntime 1.13 (2022) and every later one reads."""
+
+
+def onnx_model(weights: Weights) -> bytes:
+    """Serialised model: input `features` float32 [pixels, F] (raw, in the manifest's order), outputs `a`, `b` [pixels].
+
+    The normalisation is folded into the first layer.
+    """
+    nodes: list[onnx.NodeProto] = []
+    constants: list[onnx.TensorProto] = []
+
+    def constant(name: str, value: NDArray[np.generic]) -> str:
+        constants.append(numpy_helper.from_array(np.ascontiguousarray(value), name))
+        return name
+
+    current = "features"
+    last = len(weights.folded) - 1
+    for i, (weight, bias) in enumerate(weights.folded):
+        inputs = [current, constant(f"layer{i}.weight", weight), constant(f"layer{i}.bias", bias)]
+        nodes.append(helper.make_node("Gemm", inputs, [f"dense{i}"], transB=1))
+        current = f"dense{i}"
+        if i < last:
+            nodes.append(helper.make_node("Relu", [current], [f"hidden{i}"]))
+            current = f"hidden{i}"
+    axis = constant("axis", np.array([1], dtype=np.int64))
+    sizes = constant("sizes", np.array([1, 1], dtype=np.int64))
+    nodes += [
+        helper.make_node("Split", [current, sizes], ["a_column", "b_column"], axis=1),
+        helper.make_node("Squeeze", ["a_column", axis], ["a"]),
+        helper.make_node("Softplus", ["b_column"], ["b_positive"]),
+        helper.make_node("Add", ["b_positive", constant("floor", np.array([GAIN_FLOOR], np.float32))], ["b_sum"]),
+        helper.make_node("Squeeze", ["b_sum", axis], ["b"]),
+    ]
+    graph = helper.make_graph(
+        nodes,
+        "gain-curve",
+        [helper.make_tensor_value_info("features", TensorProto.FLOAT, ["pixels", len(weights.features)])],
+        [helper.make_tensor_value_info(name, TensorProto.FLOAT, ["pixels"]) for name in ("a", "b")],
+        constants,
+    )
+    model = helper.make_model(
+        graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION, producer_name="diaphane"
+    )
+    onnx.checker.check_model(model, full_check=True)
+    return bytes(model.SerializeToString())

@@ -1,0 +1,146 @@
+"""Proof that the three forms of a network agree: torch, ONNX in onnxruntime, GLSL on this machine's GL driver."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import moderngl
+import numpy as np
+import onnxruntime
+import torch
+from numpy.typing import NDArray
+
+from renderer.context import describe
+from renderer.features import FEATURES
+from schemas.bundle import GLSL, ONNX, ParityReport
+from schemas.problem import ExitCode, Problem
+from trainer.models import GainCurve
+from trainer.weights import Weights
+
+TOLERANCE: Final = 1e-5
+"""Largest difference, relative to max(1, |value|)."""
+
+CHUNK: Final = 1 << 17
+"""Rows at a time: 26 features of that many are 14 MB."""
+
+_GROUP: Final = 64
+
+_MAIN: Final = f"""
+layout(local_size_x = {_GROUP}) in;
+layout(std430, binding = 0) readonly buffer Inputs {{ float inputs[]; }};
+layout(std430, binding = 1) writeonly buffer Outputs {{ vec2 outputs[]; }};
+uniform uint rows;
+
+void main() {{
+    uint row = gl_GlobalInvocationID.x;
+    if (row >= rows) return;
+    float x[DIAPHANE_FEATURES];
+    for (int i = 0; i < DIAPHANE_FEATURES; ++i) x[i] = inputs[row * uint(DIAPHANE_FEATURES) + uint(i)];
+    outputs[row] = diaphane_predict(x);
+}}
+"""
+
+
+def check(
+    weights: Weights, folder: Path, features: NDArray[np.float32], ctx: moderngl.Context, tolerance: float = TOLERANCE
+) -> ParityReport:
+    """Compare the forms on real inputs.
+
+    Args:
+        weights: The network, for torch.
+        folder: Where `model.onnx` and `predict.glsl` are.
+        features: float32 [R, 26], columns `renderer.features.FEATURES`; all rows are compared.
+        ctx: The GL context.
+        tolerance: Largest difference allowed, relative to max(1, |value|).
+
+    Raises:
+        Problem: There are no rows, a value is not finite, GLSL does not compile, or a form differs.
+    """
+    if features.ndim != 2 or features.shape[1] != len(FEATURES) or not len(features):
+        raise _refused(f"features have the shape {features.shape}, not [rows, {len(FEATURES)}]")
+    if not np.isfinite(features).all():
+        raise _refused("a feature is not finite")
+    inputs = np.ascontiguousarray(features[:, weights.columns])
+    truth = torch_outputs(weights, inputs)
+    if not np.isfinite(truth).all():
+        raise _refused("the network's output is not finite")
+    report = ParityReport(
+        count=len(inputs),
+        tolerance=tolerance,
+        torch_onnx=_difference(truth, onnx_outputs(folder / ONNX, inputs), "onnxruntime"),
+        torch_glsl=_difference(truth, glsl_outputs(folder / GLSL, inputs, ctx), "GLSL"),
+        driver=describe(ctx),
+    )
+    if max(report.torch_onnx, report.torch_glsl) > tolerance:
+        raise _refused(
+            f"the forms differ by {report.torch_onnx:.2g} (ONNX) and {report.torch_glsl:.2g} (GLSL on {report.driver}) "
+            f"from torch, more than {tolerance:g}"
+        )
+    return report
+
+
+def torch_outputs(weights: Weights, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
+    """float32 [R, 2] of torch; inputs float32 [R, F] in the order of the weights' features."""
+    model = GainCurve.from_weights(weights)
+    parts = []
+    with torch.no_grad():
+        for start in range(0, len(inputs), CHUNK):
+            a, b = model(torch.from_numpy(inputs[start : start + CHUNK]))
+            parts.append(torch.stack([a, b], dim=1).numpy())
+    return np.concatenate(parts)
+
+
+def onnx_outputs(path: Path, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
+    """The same from an ONNX file in onnxruntime, on the CPU."""
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 2
+    session = onnxruntime.InferenceSession(path.read_bytes(), options, providers=["CPUExecutionProvider"])
+    parts = []
+    for start in range(0, len(inputs), CHUNK):
+        a, b = session.run(["a", "b"], {"features": inputs[start : start + CHUNK]})
+        parts.append(np.stack([a, b], axis=1))
+    return np.concatenate(parts)
+
+
+def glsl_outputs(path: Path, inputs: NDArray[np.float32], ctx: moderngl.Context) -> NDArray[np.float32]:
+    """The same from a GLSL file in a compute shader.
+
+    Raises:
+        Problem: The driver does not compile it.
+    """
+    try:
+        shader = ctx.compute_shader(f"#version 450\n{path.read_text()}{_MAIN}")
+    except moderngl.Error as reason:
+        raise _refused(f"{path.name} does not compile: {reason}") from reason
+    source = ctx.buffer(reserve=min(CHUNK, len(inputs)) * inputs.shape[1] * 4)
+    target = ctx.buffer(reserve=min(CHUNK, len(inputs)) * 8)
+    parts = []
+    try:
+        for start in range(0, len(inputs), CHUNK):
+            chunk = inputs[start : start + CHUNK]
+            source.write(chunk.tobytes())
+            source.bind_to_storage_buffer(0)
+            target.bind_to_storage_buffer(1)
+            shader["rows"] = len(chunk)
+            shader.run(-(-len(chunk) // _GROUP))
+            ctx.memory_barrier()
+            parts.append(np.frombuffer(target.read(len(chunk) * 8), dtype=np.float32).reshape(-1, 2))
+    finally:
+        for resource in (source, target, shader):
+            resource.release()
+    return np.concatenate(parts)
+
+
+def _difference(truth: NDArray[np.float32], other: NDArray[np.float32], form: str) -> float:
+    if not np.isfinite(other).all():
+        raise _refused(f"the output of {form} is not finite")
+    return float((np.abs(other.astype(np.float64) - truth) / np.maximum(1.0, np.abs(truth))).max())
+
+
+def _refused(why: str) -> Problem:
+    return Problem(
+        f"The bundle is not written: {why}.",
+        "Train again, with another seed if it stays so; if only GLSL differs, update the GL driver.",
+        ExitCode.CHECK_FAILED,
+    )
