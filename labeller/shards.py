@@ -69,7 +69,7 @@ class ShardMeta(BaseModel):
         height: Rows.
         fragments: N.
         occupied: Pixels with at least one fragment.
-        eligible: Pixels with a hull, of which the rows are a sample.
+        eligible: Pixels with more than k_min fragments, of which the rows are a sample.
         tail: Tail of the error curves.
         g: Steepness of the density tail.
         metric: Space of the error.
@@ -154,11 +154,12 @@ def write_shard(
         curves: Its error curves.
         hulls: The curves' hulls.
         budgets: Fragment counts F that results are measured at; those of N and above are left out.
-        fraction: Share of the pixels with a hull that become rows, the same for every n.
+        fraction: Share of the pixels with more than k_min fragments that become rows, the same for every n.
         seed: Seed of the sample.
     """
     sizes = np.diff(hulls.offsets)
-    eligible = np.flatnonzero(sizes)
+    # Pixels without a hull gain nothing, but a predictor that does not know them would spend on them all the same.
+    eligible = np.flatnonzero(dump.counts > hulls.k_min)
     pixel = stratified_sample(eligible, dump.counts[eligible], fraction, seed)
     rows = sizes[pixel]
     hull_offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(rows)])

@@ -16,7 +16,7 @@ from renderer.usd.instances import Draw, Walker
 from renderer.usd.materials import MaterialTable
 from renderer.usd.meshes import read_shape
 from renderer.usd.parts import Part, bindings, build_parts, canonical_path
-from renderer.usd.stage import WarningLog, open_stage, stage_time, usd_diagnostics
+from renderer.usd.stage import WarningLog, open_stage, stage_time, usd_diagnostics, usd_reason
 from renderer.usd.textures import TextureTable
 from schemas.problem import ExitCode, Problem
 from schemas.scene import SceneArrays
@@ -63,9 +63,10 @@ def load_scene(path: Path, options: LoadOptions = LoadOptions()) -> SceneArrays:
         with usd_diagnostics(log):
             stage = open_stage(path, options.variants)
             scene = _StageReader(stage, path, options, log).read()
-    except Tf.ErrorException as error:
+    except (Tf.ErrorException, UnicodeDecodeError) as error:
+        # Also a damaged file's strings can have bytes that are no text.
         raise Problem(
-            f"{path} cannot be read: {str(error).strip()[:300]}", "Check it with usdchecker.", ExitCode.USAGE
+            f"{path} cannot be read as USD: {usd_reason(error)}.", "Check it with usdchecker.", ExitCode.USAGE
         ) from error
     return replace(scene, warnings=log.lines())
 

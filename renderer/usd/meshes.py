@@ -146,7 +146,8 @@ def unit_rows(vectors: NDArray[np.floating]) -> NDArray[np.float32]:
 
 def _floats(values: object) -> NDArray[np.float64]:
     rows = None if values is None else as_rows(values, 3)
-    return np.zeros((0, 3)) if rows is None else rows.astype(np.float64)
+    with np.errstate(invalid="ignore"):
+        return np.zeros((0, 3)) if rows is None else rows.astype(np.float64)
 
 
 def _integers(values: object) -> NDArray[np.int64]:

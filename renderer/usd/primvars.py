@@ -82,7 +82,8 @@ class PrimvarReader:
 def as_rows(values: object, width: int) -> NDArray[np.float32] | None:
     """A value or array of values as float32 [n, width]; None if it does not have that shape."""
     try:
-        array = np.asarray(values, dtype=np.float32)
+        with np.errstate(over="ignore", invalid="ignore"):
+            array = np.asarray(values, dtype=np.float32)
     except (TypeError, ValueError):
         return None
     if array.ndim <= 1 and array.size % width == 0 and (width == 1 or array.size == width):

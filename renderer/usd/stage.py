@@ -87,7 +87,7 @@ def open_stage(path: Path, variants: tuple[str, ...] = ()) -> Usd.Stage:
         stage = Usd.Stage.Open(str(path.resolve()), Usd.Stage.LoadAll)
     except Tf.ErrorException as error:
         raise Problem(
-            f"{path} cannot be read as USD: {_reason(error)}.",
+            f"{path} cannot be read as USD: {usd_reason(error)}.",
             "Open it with usdview or usdcat, or export it again.",
             ExitCode.USAGE,
         ) from error
@@ -109,10 +109,15 @@ def stage_time(stage: Usd.Stage, time: float | None) -> Usd.TimeCode:
     return Usd.TimeCode.EarliestTime()
 
 
-def _reason(error: Exception) -> str:
+def usd_reason(error: Exception) -> str:
     """The innermost quoted message of a Tf error, on one line, without addresses."""
-    messages = re.findall(r" : '(.*?)'\s*$", str(error), flags=re.MULTILINE | re.DOTALL)
-    text = messages[0] if messages else str(error)
+    try:
+        text = str(error)
+    except UnicodeDecodeError:
+        # The message quotes the file, whatever bytes that has.
+        return "it is damaged"
+    messages = re.findall(r" : '(.*?)'\s*$", text, flags=re.MULTILINE | re.DOTALL)
+    text = messages[0] if messages else text
     return re.sub(r"\s+", " ", text).strip().rstrip(".")[:300]
 
 

@@ -281,3 +281,10 @@ def test_loading_leaves_the_layer_as_it_was(tmp_path: Path) -> None:
     load_scene(file)
     assert file.read_bytes() == before
     assert not Usd.Stage.Open(str(file)).GetRootLayer().dirty
+
+
+def test_a_damaged_file_whose_error_is_no_text_is_still_a_problem(tmp_path: Path) -> None:
+    file = tmp_path / "bytes.usda"
+    file.write_bytes(b'#usda 1.0\ndef Mesh "a\xf3\xff\xfe" { \xf3\xff }\n')
+    with pytest.raises(Problem, match="cannot be read as USD"):
+        load_scene(file)

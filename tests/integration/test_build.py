@@ -1,0 +1,163 @@
+"""The main job, whole, on small pictures of the project's own scenes."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+
+import pytest
+
+from renderer.samples import write_samples
+from schemas.bundle import load_manifest
+from schemas.problem import Problem
+from services import pipeline, summary
+from services.options import BuildOptions
+from services.progress import SilentProgress
+from services.registry import Registry
+from services.result import BuildResult
+
+TRAIN = ("nested_shells.usda", "torus_knots.usdc")
+HELD_OUT = "voxel_town.usdc"
+
+
+@pytest.fixture(scope="module")
+def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("samples")
+    write_samples(folder)
+    return folder
+
+
+def options(samples: Path, state: Path, scenes: tuple[str, ...] = (*TRAIN, HELD_OUT), **changes: object) -> BuildOptions:
+    settings: dict[str, object] = {
+        "scenes": tuple(samples / name for name in scenes),
+        "name": "small",
+        "holdout": (samples / HELD_OUT,),
+        "budgets": (1.0, 2.0),
+        "width": 176,
+        "height": 118,
+        "steps": 200,
+        "state": state,
+    }
+    return BuildOptions(**{**settings, **changes})  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def state(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("state")
+
+
+@pytest.fixture(scope="module")
+def built(samples: Path, state: Path) -> BuildResult:
+    return pipeline.build(options(samples, state), SilentProgress())
+
+
+def test_build_publishes_a_proven_bundle(built: BuildResult, state: Path) -> None:
+    publication = Registry(state / "registry").resolve("small@champion")
+    manifest = load_manifest(Path(built.registry.folder))
+    assert built.registry.champion
+    assert publication.score == built.registry.score
+    assert manifest.parity.torch_onnx <= 1e-5
+    assert manifest.parity.torch_glsl <= 1e-5
+    assert set(manifest.provenance.scenes) == {"nested_shells", "torus_knots"}
+    assert set(manifest.provenance.holdout) == {"voxel_town"}
+
+
+def test_held_out_pictures_are_measured_next_to_fixed_vkb_and_oracle(built: BuildResult) -> None:
+    assert built.held_out == ("voxel_town",)
+    measured = summary.compared(built.measurements)
+    assert {m.technique for m in measured} == {"kbuffer", "kbuffer-importance", "kbuffer-deep", "kbuffer-optimal"}
+    assert {m.scene for m in measured} == {"voxel_town"}
+    for m in measured:
+        assert m.cpu_difference is not None
+        assert m.cpu_difference <= 1
+        assert m.captured_fragments is not None
+        assert m.captured_fragments <= m.budget
+    for m in measured:
+        if m.technique == "kbuffer-deep":
+            assert m.captured_fragments == m.budget, "a predicted budget is met exactly"
+
+
+def test_oracle_is_never_worse_than_the_others(built: BuildResult) -> None:
+    for technique in ("kbuffer", "kbuffer-importance", "kbuffer-deep"):
+        for ratio in summary.ratios(built.measurements, technique, "kbuffer-optimal"):
+            assert ratio > 0.98, "the oracle minimises the error before 8-bit rounding, which may add a little"
+
+
+def test_report_stands_alone(built: BuildResult) -> None:
+    html = built.report.read_text(encoding="utf-8")
+    assert "voxel_town" in html
+    assert 'src="http' not in html
+    assert "data:image/webp;base64," in html
+
+
+def test_same_command_again_does_nothing_and_is_quick(built: BuildResult, samples: Path, state: Path) -> None:
+    started = time.monotonic()
+    again = pipeline.build(options(samples, state), SilentProgress())
+    assert not again.worked
+    assert time.monotonic() - started < 5.0
+    assert again.registry.reference == built.registry.reference
+    assert again.skipped["views already captured"] == 9
+
+
+def test_an_added_scene_is_the_only_one_rendered_and_labelled(built: BuildResult, samples: Path, state: Path) -> None:
+    more = options(samples, state, scenes=(*TRAIN, HELD_OUT, "bottles.usdc"))
+    store = state / "store"
+    before = {stage: len(list((store / stage).glob("*/*"))) for stage in ("render", "label")}
+    result = pipeline.build(more, SilentProgress())
+    after = {stage: len(list((store / stage).glob("*/*"))) for stage in ("render", "label")}
+    assert {stage: after[stage] - before[stage] for stage in before} == {"render": 3, "label": 3}
+    assert result.skipped["baseline pictures already rendered"] == 3
+    assert result.registry.reference == "small@1.1.0"
+
+
+def test_interrupted_build_continues(samples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    wanted = options(samples, tmp_path, scenes=(TRAIN[0], HELD_OUT), steps=50)
+    with monkeypatch.context() as patch:
+        patch.setattr(pipeline, "learn", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            pipeline.build(wanted, SilentProgress())
+    result = pipeline.build(wanted, SilentProgress())
+    assert result.skipped["views already captured"] == 6
+    assert result.skipped["views already labelled"] == 6
+
+
+def test_budget_beyond_all_fragments_is_exact_and_says_so(samples: Path, tmp_path: Path) -> None:
+    result = pipeline.build(
+        options(samples, tmp_path, scenes=(TRAIN[0], HELD_OUT), budgets=(1.0, 64.0), steps=50), SilentProgress()
+    )
+    beyond = [m for m in result.measurements if m.budget_factor == 64.0]
+    assert beyond
+    for m in beyond:
+        assert m.exact
+        assert m.mse == 0.0
+        assert m.skipped is not None
+        assert "exact" in m.skipped
+    assert result.skipped["views that a budget of 64 holds completely: exact without predictor"] == 6
+
+
+def test_opaque_scene_is_refused_with_the_way_out(tmp_path: Path) -> None:
+    scene = tmp_path / "solid.usda"
+    scene.write_text('#usda 1.0\n(defaultPrim = "C")\ndef Cube "C" {}\n', encoding="utf-8")
+    wanted = BuildOptions(scenes=(scene,), name="solid", width=64, height=48, state=tmp_path / "state", steps=20)
+    with pytest.raises(Problem, match=r"solid.*--alpha 0\.33"):
+        pipeline.build(wanted, SilentProgress())
+    made = pipeline.build(
+        BuildOptions(
+            scenes=(scene,),
+            name="solid",
+            alpha=0.33,
+            budgets=(0.25,),
+            width=64,
+            height=48,
+            state=tmp_path / "state",
+            steps=20,
+        ),
+        SilentProgress(),
+    )
+    assert made.held_out == ()
+    assert not made.registry.champion, "one scene proves nothing, so nothing is promoted"
+    assert json.loads(Path(made.registry.folder, "manifest.json").read_text())["tail"]["name"] == "density"
