@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
@@ -47,15 +48,14 @@ def build(options: BuildOptions, progress: Progress) -> BuildResult:
     work = Workspace(options, Store(options.state / "store"), progress)
     scenes = inspect_scenes(work)
     views = label_views(work, render_views(work, scenes))
-    _require_training(scenes, views)
+    _require_views(scenes, views)
     _note_exact_budgets(work, views)
     bundle = learn(work, scenes, views)
     judged = [view for view in views if view.scene.held_out] or list(views)
     evaluated = evaluate_views(work, judged, bundle.folder, bundle_digest(bundle.folder))
 
     def measure(folder: Path, digest: str) -> list[Measurement]:
-        others = evaluate_views(work, judged, folder, digest)
-        return [m for view in others for m in view.measurements if m.technique == summary.BUNDLE]
+        return [m for view in evaluate_views(work, judged, folder, digest, ("bundle",)) for m in view.measurements]
 
     registered = publish(work, bundle.folder, evaluated, measure)
     data = ReportData(
@@ -90,34 +90,36 @@ def build(options: BuildOptions, progress: Progress) -> BuildResult:
 
 def command_line(options: BuildOptions) -> str:
     """The command that asks for this build again."""
-    parts = ["diaphane build", *(str(scene) for scene in options.scenes)]
-    parts.append("--budgets " + ",".join(f"{budget:g}" for budget in options.budgets))
-    parts.append(f"--name {options.name} --size {options.width}x{options.height}")
-    parts += [f"--alpha {options.alpha:g}"] if options.alpha is not None else []
-    parts += [f"--holdout {scene}" for scene in options.holdout]
-    parts += [f"--views {options.views}"] if options.views is not None else []
-    parts.append(f"--views-per-scene {options.views_per_scene} --tail {options.tail} --g {options.g:g}")
-    parts.append(f"--seed {options.seed}" + (f" --steps {options.steps}" if options.steps is not None else ""))
-    return " ".join(parts)
+    parts = ["diaphane", "build", *map(str, options.scenes)]
+    parts += ["--budgets", ",".join(f"{budget:g}" for budget in options.budgets)]
+    parts += ["--name", options.name, "--size", f"{options.width}x{options.height}"]
+    parts += ["--alpha", f"{options.alpha:g}"] if options.alpha is not None else []
+    for scene in options.holdout:
+        parts += ["--holdout", str(scene)]
+    parts += ["--views", str(options.views)] if options.views is not None else []
+    parts += ["--views-per-scene", str(options.views_per_scene), "--tail", options.tail, "--g", f"{options.g:g}"]
+    parts += ["--seed", str(options.seed)]
+    parts += ["--steps", str(options.steps)] if options.steps is not None else []
+    return shlex.join(parts)
 
 
-def _require_training(scenes: Sequence[SceneEntry], views: Sequence[LabelledView]) -> None:
-    if not any(not view.scene.held_out for view in views):
-        names = ", ".join(scene.label for scene in scenes if not scene.held_out)
-        raise Problem(
-            f"No view of {names} shows a transparent surface, so there is nothing to train on.",
-            "Give views with --views, or add scenes.",
-            ExitCode.CHECK_FAILED,
-        )
+def _require_views(scenes: Sequence[SceneEntry], views: Sequence[LabelledView]) -> None:
+    seen = {view.scene.held_out for view in views}
+    for held_out, purpose in ((False, "train on"), (True, "evaluate on")):
+        names = ", ".join(scene.label for scene in scenes if scene.held_out == held_out)
+        if names and held_out not in seen:
+            raise Problem(
+                f"No view of {names} shows a transparent surface, so there is nothing to {purpose}.",
+                "Give views with --views, choose --holdout otherwise, or add scenes.",
+                ExitCode.CHECK_FAILED,
+            )
 
 
 def _note_exact_budgets(work: Workspace, views: Sequence[LabelledView]) -> None:
     for factor, fragments in zip(work.options.budgets, work.budgets, strict=True):
         exact = sum(fragments >= view.rendered.total for view in views)
         if exact:
-            work.progress.skipped(
-                f"views that a budget of {factor:g} holds completely (exact, no predictor needed)", exact
-            )
+            work.progress.skipped(f"views that a budget of {factor:g} holds completely: exact without predictor", exact)
 
 
 def _scene_summary(scene: SceneEntry, views: Sequence[LabelledView]) -> SceneSummary:

@@ -132,7 +132,8 @@ class _SurfaceBuilder:
         triangles = triangles[~degenerate(positions, triangles)]
         target = _target(corner)
         colours = topology.spread(self._colour, target)
-        for layer, kept in layers(colours[:, 3][triangles], self._surface.opacity_sampler is not None):
+        textured, cut_out = self._surface.opacity_sampler is not None, self._surface.threshold > 0.0
+        for layer, kept in layers(colours[:, 3][triangles], textured, cut_out):
             if np.any(kept):
                 yield self._part(positions, colours, triangles[kept], topology, corner, layer)
 
@@ -265,14 +266,20 @@ def degenerate(positions: NDArray[np.float64], triangles: NDArray[np.int64]) -> 
     return np.asarray(~np.any(np.cross(b - a, c - a), axis=1))
 
 
-def layers(alpha: NDArray[np.floating], textured: bool) -> Iterator[tuple[Layer, Mask]]:
+def layers(alpha: NDArray[np.floating], textured: bool, cut_out: bool) -> Iterator[tuple[Layer, Mask]]:
     """Masks of the triangles of each layer; triangles that show nothing are in none.
 
     Args:
         alpha: Stored alpha of the corners, 0..255 [T, 3].
         textured: Whether a texture gives the opacity.
+        cut_out: Whether that texture only decides, by a threshold, which fragments are there at all.
     """
     low, high = alpha.min(axis=1, initial=255.0), alpha.max(axis=1, initial=0.0)
+    if textured and cut_out:
+        # What a cut-out leaves of an opaque surface is opaque: no transparent pass needs to see it.
+        yield "opaque", low == 255
+        yield "mixed", (low < 255) & (high > 0)
+        return
     if textured:
         yield "mixed", high > 0
         return

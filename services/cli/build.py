@@ -95,6 +95,9 @@ def _show(options: BuildOptions, result: BuildResult) -> None:
         console.print(summary.sentence(held_out), markup=False)
     else:
         console.print("No scene was held out, so nothing is proven: give a second scene.", markup=False)
+    if result.skipped:
+        skipped = ", ".join(f"{count} {what}" for what, count in result.skipped.items())
+        console.print(f"Skipped: {skipped}.", markup=False)
     if not result.worked:
         console.print("Nothing had to be done: every artifact was there already.", markup=False)
     console.print(f"{result.registry.reference}: {result.registry.reason}", markup=False)

@@ -65,7 +65,11 @@ class EvaluatedView:
 
 
 def evaluate_views(
-    work: Workspace, views: Iterable[LabelledView], bundle: Path, bundle_digest: str
+    work: Workspace,
+    views: Iterable[LabelledView],
+    bundle: Path,
+    bundle_digest: str,
+    kinds: tuple[Kind, ...] = ("baseline", "bundle"),
 ) -> tuple[EvaluatedView, ...]:
     """Render and measure views with the baselines, the oracle and a bundle.
 
@@ -74,16 +78,17 @@ def evaluate_views(
         views: Labelled views.
         bundle: The bundle's folder.
         bundle_digest: Hash of its files.
+        kinds: Which of the two kinds of technique.
     """
     listed = list(views)
     evaluated = []
-    with work.progress.stage("evaluate pictures", 2 * len(listed)) as stage:
+    with work.progress.stage("evaluate pictures", len(kinds) * len(listed)) as stage:
         for view in listed:
             # The frame's opaque and gather passes serve both kinds, if either has to be rendered at all.
             session = _Session(work, view)
             folders: dict[str, Path] = {}
             measurements: list[Measurement] = []
-            for kind in ("baseline", "bundle"):
+            for kind in kinds:
                 folder = _evaluate(work, view, kind, session, bundle, bundle_digest)
                 records = json.loads((folder / "measurements.json").read_text(encoding="utf-8"))
                 made = [Measurement.model_validate({**record, "scene": view.scene.label}) for record in records]

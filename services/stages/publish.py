@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -33,7 +32,7 @@ def publish(work: Workspace, bundle: Path, views: Sequence[EvaluatedView], measu
     measurements = [m for view in held_out for m in view.measurements]
     score = summary.score(measurements)
     known = {publication.digest for publication in registry.versions(name)}
-    publication = registry.publish(name, bundle, math.nan if score is None else score, _evaluation(work, held_out))
+    publication = registry.publish(name, bundle, score, _evaluation(work, held_out))
     if publication.digest in known:
         work.progress.skipped("bundles already published")
     champion = registry.champion(name)

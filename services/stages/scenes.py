@@ -33,8 +33,7 @@ def inspect_scenes(work: Workspace) -> tuple[SceneEntry, ...]:
         for path in options.scenes:
             entries.append(_inspect(work, path))
             stage.advance(1, options.labels[path])
-    _refuse_opaque(entries)
-    return tuple(entries)
+    return _transparent(work, entries)
 
 
 def _inspect(work: Workspace, path: Path) -> SceneEntry:
@@ -84,10 +83,20 @@ def _facts(work: Workspace, path: Path) -> dict[str, object]:
     }
 
 
-def _refuse_opaque(entries: list[SceneEntry]) -> None:
-    opaque = [entry.label for entry in entries if entry.opaque]
+def _transparent(work: Workspace, entries: list[SceneEntry]) -> tuple[SceneEntry, ...]:
+    """The scenes that have something transparent; an opaque one among them is left out, and that is said.
+
+    Raises:
+        Problem: None is left, or none to train on, or none of those held out.
+    """
+    opaque = [entry for entry in entries if entry.opaque]
+    kept = [entry for entry in entries if not entry.opaque]
     if opaque:
-        raise Problem(
-            f"Nothing in {', '.join(opaque)} is transparent, so there is nothing to allocate.",
-            "Leave it out, or make every surface of all scenes transparent with --alpha 0.33.",
-        )
+        names = ", ".join(entry.label for entry in opaque)
+        why = f"Nothing in {names} is transparent, so there is nothing to allocate."
+        remedy = "Make every surface of all scenes transparent with --alpha 0.33, or name other scenes."
+        if {entry.held_out for entry in kept} != {entry.held_out for entry in entries}:
+            raise Problem(why, remedy)
+        work.progress.skipped("opaque scenes", len(opaque))
+        work.progress.note(f"{why} Left out. {remedy}")
+    return tuple(kept)

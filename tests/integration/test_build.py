@@ -28,7 +28,9 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def options(samples: Path, state: Path, scenes: tuple[str, ...] = (*TRAIN, HELD_OUT), **changes: object) -> BuildOptions:
+def options(
+    samples: Path, state: Path, scenes: tuple[str, ...] = (*TRAIN, HELD_OUT), **changes: object
+) -> BuildOptions:
     settings: dict[str, object] = {
         "scenes": tuple(samples / name for name in scenes),
         "name": "small",

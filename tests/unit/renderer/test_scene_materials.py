@@ -140,10 +140,10 @@ def test_a_texture_gives_colour_and_opacity_and_coordinates_are_transformed(tmp_
 
 def test_cut_outs_keep_their_shape_with_and_without_alpha(tmp_path: Path) -> None:
     inputs = OPACITY + "\nfloat inputs:opacityThreshold = 0.5"
-    for alpha, stored in ((None, 255), (0.2, 51)):
+    for alpha, stored, layer in ((None, 255, "opaque"), (0.2, 51, "mixed")):
         scene = load(tmp_path, inputs, TEXTURE % (image(tmp_path), ""), alpha=alpha)
         assert scene.batches[0].opacity_threshold == 0.5
-        assert scene.batches[0].layer == "mixed"
+        assert scene.batches[0].layer == layer
         assert set(scene.colours[:, 3]) == {stored}
 
 
