@@ -22,7 +22,7 @@ from services.result import BuildResult
 from services.stages.evaluate import EvaluatedView, evaluate_views
 from services.stages.label import LabelledView, label_views
 from services.stages.learn import Bundle, learn
-from services.stages.pictures import read_png, stem
+from services.stages.pictures import EXACT, read_png, stem
 from services.stages.publish import publish
 from services.stages.render import render_views
 from services.stages.scenes import inspect_scenes
@@ -172,6 +172,6 @@ def _picture_set(view: EvaluatedView, factor: float) -> PictureSet:
         scene=view.labelled.scene.label,
         view=view.labelled.rendered.view.name,
         budget_factor=factor,
-        exact=read_png(view.folders["sbuffer"] / "exact.png"),
+        exact=read_png(view.folders["sbuffer"] / EXACT),
         techniques=techniques,
     )

@@ -55,7 +55,7 @@ class TrainConfig(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     seed: int = 0
-    steps: int = Field(default=6000, gt=0)
+    steps: int = Field(default=4000, gt=0)
     batch: int = Field(default=4096, ge=GROUP)
     lr: float = Field(default=4e-3, gt=0.0)
     hidden: tuple[int, ...] = (32, 16)

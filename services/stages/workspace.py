@@ -57,7 +57,8 @@ class Workspace:
     worked: bool = False
     _path: Path | None = None
     _scene: SceneArrays | None = None
-    _gpu: GpuScene | None = field(default=None)
+    _gpu: GpuScene | None = None
+    _compiled: set[str] = field(default_factory=set)
 
     def scene(self, path: Path) -> SceneArrays:
         """The scene's triangles; only the last one asked for is kept in memory."""
@@ -72,7 +73,13 @@ class Workspace:
         scene = self.scene(path)
         if self._gpu is None:
             self._gpu = GpuScene(gl_context(), scene)
+            self._compiled.clear()
         return self._gpu
+
+    def compiled(self, path: Path) -> set[str]:
+        """Names of the techniques whose shaders were compiled for the scene on the GPU."""
+        self.gpu(path)
+        return self._compiled
 
     @property
     def budgets(self) -> tuple[int, ...]:

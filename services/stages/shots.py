@@ -1,0 +1,173 @@
+"""One technique on one view at one budget: rendered, checked against its CPU simulation, compared with the exact."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labeller.curves import composite
+from renderer import metrics
+from renderer.dump import read_dump
+from renderer.frame import Frame
+from renderer.techniques import Budget, Rendered, SBuffer, Technique
+from schemas.colour import display8
+from schemas.fragments import FragmentDump
+from schemas.measurement import Measurement
+from schemas.problem import ExitCode, Problem
+from services.stages.label import LabelledView
+from services.stages.pictures import EXACT, quantise_map, stem, write_png
+from services.stages.render import frame_of
+from services.stages.workspace import Workspace
+
+AGREEMENT = 1
+"""Steps of 1/255 by which a GL picture may differ from the CPU simulation of its own allocation, in any channel."""
+
+_WARM_SIZE = (64, 48)
+
+
+class Session:
+    """A view being evaluated: what its shots share, made when first needed.
+
+    Args:
+        work: The build.
+        view: The view.
+    """
+
+    def __init__(self, work: Workspace, view: LabelledView) -> None:
+        self.work, self.view = work, view
+
+    @cached_property
+    def frame(self) -> Frame:
+        """The view on the GPU."""
+        return frame_of(self.work, self.view.scene, self.view.rendered.view)
+
+    @cached_property
+    def dump(self) -> FragmentDump:
+        """Its fragments."""
+        return read_dump(self.view.rendered.folder)
+
+    @cached_property
+    def exact(self) -> NDArray[np.uint8]:
+        """The reference picture, uint8 [H, W, 3]: all fragments composited on the CPU in float64."""
+        return self.simulate(self.dump.counts.astype(np.int32))
+
+    def simulate(self, k: NDArray[np.int32]) -> NDArray[np.uint8]:
+        """The CPU's picture of an allocation, uint8 [H, W, 3]."""
+        options = self.work.options
+        linear = composite(self.dump, k, options.tail, options.g)
+        return display8(linear.reshape(options.height, options.width, 3))
+
+    def render(self, make: Callable[[Frame], Technique], budget: Budget) -> Rendered:
+        """A technique's picture; drivers compile shaders at their first use, so that is not the one measured."""
+        technique = make(self.frame)
+        compiled = self.work.compiled(self.view.scene.path)
+        if technique.name not in compiled:
+            compiled.add(technique.name)
+            small = Frame(self.work.gpu(self.view.scene.path), self.view.rendered.view, *_WARM_SIZE)
+            share = max(1, budget.fragments * small.pixels // self.frame.pixels)
+            make(small).render(small, Budget(share, budget.tail, budget.g))
+        return technique.render(self.frame, budget)
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """A view and a budget, waiting for a technique.
+
+    Attributes:
+        session: The view.
+        folder: Where pictures go.
+        factor: F / (width * height).
+        fragments: F.
+    """
+
+    session: Session
+    folder: Path
+    factor: float
+    fragments: int
+
+    def take(self, name: str, make: Callable[[Frame], Technique]) -> Measurement:
+        """Render with the technique that `make` gives for a frame, compare, keep the pictures."""
+        if self.fragments >= self.session.view.rendered.total:
+            why = "the budget holds every fragment: every technique is exact"
+            return self._record(name, exact=True, skipped=why, mse=0.0)
+        options = self.session.work.options
+        rendered = self.session.render(make, Budget(self.fragments, options.tail, options.g))
+        return self._measure(name, rendered, exact=False)
+
+    def take_exact(self) -> Measurement:
+        """Render with all fragments: what it costs is the memory it needs."""
+        try:
+            rendered = self.session.render(lambda _: SBuffer(), Budget(self.fragments))
+        except Problem as problem:  # more fragments than a storage buffer holds: the others can still be measured
+            return self._record(SBuffer.name, exact=True, skipped=problem.title)
+        return self._measure(SBuffer.name, rendered, exact=True)
+
+    def _measure(self, name: str, rendered: Rendered, exact: bool) -> Measurement:
+        image, reference = display8(rendered.linear), self.session.exact
+        difference = _largest_difference(image, self.session.simulate(rendered.k))
+        self._require_agreement(name, difference)
+        error = metrics.mse(image, reference)
+        occupied = self.session.dump.counts > 0
+        shape = (-1, 3)
+        flip, error_map = metrics.flip(image, reference)
+        self._keep(name, image, error_map, rendered.k)
+        return self._record(
+            name,
+            exact=exact,
+            mse=error,
+            mse_occupied=metrics.mse(image.reshape(shape)[occupied], reference.reshape(shape)[occupied]),
+            psnr=None if error == 0.0 else metrics.psnr(error),
+            flip=flip,
+            k_min=int(rendered.k[occupied].min()),
+            k_max=int(rendered.k.max()),
+            captured_fragments=rendered.captured,
+            pool_bytes=rendered.pool_bytes,
+            total_bytes=rendered.total_bytes,
+            passes=rendered.passes,
+            total_ms=rendered.milliseconds,
+            cpu_difference=difference,
+        )
+
+    def _keep(self, name: str, image: NDArray[np.uint8], error_map: NDArray[np.float32], k: NDArray[np.int32]) -> None:
+        base, exact = stem(name, self.factor), self.folder / EXACT
+        write_png(self.folder / f"{base}.png", image)
+        write_png(self.folder / f"{base}.flip.png", quantise_map(error_map))
+        write_png(self.folder / f"{base}.k.png", np.minimum(k, 255).astype(np.uint8).reshape(image.shape[:2]))
+        if not exact.exists():
+            write_png(exact, self.session.exact)
+
+    def _require_agreement(self, name: str, difference: int) -> None:
+        if difference > AGREEMENT:
+            view = self.session.view
+            raise Problem(
+                f"The GL picture of {name} ({view.scene.label}, {view.rendered.view.name}) differs from the CPU "
+                f"simulation of the same allocation by {difference}/255.",
+                "This is a defect of the driver or of Diaphane: please report it with the scene.",
+                ExitCode.CHECK_FAILED,
+            )
+
+    def _record(self, name: str, **measured: Any) -> Measurement:
+        options, view = self.session.work.options, self.session.view
+        return Measurement(
+            scene=view.scene.label,
+            view=view.rendered.view.name,
+            technique=name,
+            budget=self.fragments,
+            budget_factor=self.factor,
+            width=options.width,
+            height=options.height,
+            alpha=options.alpha,
+            tail=options.tail,
+            total_fragments=view.rendered.total,
+            **measured,
+        )
+
+
+def _largest_difference(a: NDArray[np.uint8], b: NDArray[np.uint8]) -> int:
+    return int(np.abs(a.astype(np.int16) - b.astype(np.int16)).max())
