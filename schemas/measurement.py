@@ -94,11 +94,17 @@ class Certificate(_Record):
 
 
 class TrainingPoint(_Record):
-    """Loss at one step of the training, mean log(1 + regret) on the training and the validation rows."""
+    """A step of the training.
+
+    Attributes:
+        step: Steps done.
+        loss: Of that step's batch.
+        over_optimum: Squared error over the optimum's at the scored budgets, geometric mean over the training views.
+    """
 
     step: int = Field(ge=0)
-    training: float
-    validation: float | None = None
+    loss: float
+    over_optimum: float
 
 
 class SceneSummary(_Record):

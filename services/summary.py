@@ -11,6 +11,7 @@ from schemas.measurement import Measurement
 BUNDLE = "kbuffer-deep"
 BASELINE = "kbuffer-importance"
 ORACLE = "kbuffer-optimal"
+EXACT = "sbuffer"
 
 TITLES = {
     "kbuffer": "fixed k",
@@ -18,6 +19,7 @@ TITLES = {
     BASELINE: "VKB",
     BUNDLE: "this bundle",
     ORACLE: "optimal (oracle)",
+    EXACT: "exact (S-buffer)",
 }
 """Short titles in the order in which tables and pictures show the techniques; others follow under their own names."""
 
@@ -100,16 +102,22 @@ class Row:
 
 
 def rows(measurements: Sequence[Measurement]) -> list[Row]:
-    """One row for every budget and technique, budgets ascending, techniques in the order of `technique_order`."""
-    return [
-        _row([m for m in measurements if m.technique == technique and m.budget_factor == budget], measurements)
-        for budget in sorted({m.budget_factor for m in measurements})
-        for technique in technique_order(m.technique for m in measurements if m.budget_factor == budget)
+    """One row for every budget and technique, budgets ascending, techniques in the order of `technique_order`.
+
+    The exact technique, which needs another budget in every view, has one row at the end, at the largest of them.
+    """
+    bounded = [m for m in measurements if m.technique != EXACT]
+    exact = [m for m in measurements if m.technique == EXACT]
+    made = [
+        _row([m for m in bounded if m.technique == technique and m.budget_factor == budget], bounded)
+        for budget in sorted({m.budget_factor for m in bounded})
+        for technique in technique_order(m.technique for m in bounded if m.budget_factor == budget)
     ]
+    return [*made, _row(exact, exact)] if exact else made
 
 
 def _row(group: list[Measurement], everything: Sequence[Measurement]) -> Row:
-    technique, budget = group[0].technique, group[0].budget_factor
+    technique, budget = group[0].technique, max(m.budget_factor for m in group)
     run = [m for m in group if m.skipped is None]
     errors = compared(group)
     mse = geometric_mean([max(m.mse or 0.0, MSE_FLOOR) for m in errors])

@@ -15,6 +15,11 @@ settings.register_profile("diaphane", deadline=None, max_examples=50, derandomiz
 settings.load_profile("diaphane")
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """`--golden` writes the golden pictures anew."""
+    parser.addoption("--golden", action="store_true", help="write the golden pictures anew")
+
+
 @pytest.fixture(scope="session")
 def gl() -> moderngl.Context:
     """The one context of the test process."""

@@ -19,9 +19,8 @@ _GROUP = 64
 _DISPATCH = 65535 * _GROUP
 """Pixels of one dispatch: the least maximum of work groups that GL promises."""
 
-# Bindings of kbuffer-deep/predict.comp.
+# Storage bindings of kbuffer-deep/predict.comp; its textures are bound in the order of its declarations.
 _PIXELS, _Z_MIN, _Z_MAX, _NEAREST, _GAIN = range(5)
-_BACKGROUND_UNIT = 5
 
 
 class KBufferDeep:
@@ -87,10 +86,7 @@ class KBufferDeep:
             buffer.bind_to_storage_buffer(binding)
         for unit, texture in enumerate([*gathered.sums, frame.background]):
             texture.use(unit)
-        set_uniforms(
-            program,
-            {"sums": list(range(5)), "background": _BACKGROUND_UNIT, "width": frame.width, "pixels": len(pixels)},
-        )
+        set_uniforms(program, {"width": frame.width, "pixels": len(pixels)})
         for first in range(0, len(pixels), _DISPATCH):
             set_uniforms(program, {"first": first})
             program.run(-(-min(len(pixels) - first, _DISPATCH) // _GROUP))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from html import escape
 
 from schemas.measurement import TrainingPoint
-from services.summary import ORACLE, Row, number, technique_order, title
+from services.summary import EXACT, ORACLE, Row, number, technique_order, title
 
 Corners = Sequence[tuple[float, float]]
 
@@ -84,15 +84,19 @@ def time_error_chart(rows: Sequence[Row], label: str) -> str:
 
     The dashed line is the Pareto front of the techniques that a renderer can run, so without the oracle.
 
+    The exact picture, whose error no logarithmic axis can show, is a vertical line at its time.
+
     Rows without time or error are left out; '' if none is left.
     """
     points = {(r.technique, r.budget_factor): (r.ms, r.mse * 1e5) for r in rows if r.ms and r.mse}
     if not points:
         return ""
     xs, ys = [x for x, _ in points.values()], [y for _, y in points.values()]
-    frame = Frame(_padded_log(xs, 1.35), _padded_log(ys, 1.8))
+    exact = [r.ms for r in rows if r.technique == EXACT and r.ms]
+    frame = Frame(_padded_log([*xs, *exact], 1.35), _padded_log(ys, 1.8))
     real = [point for (technique, _), point in points.items() if technique != ORACLE]
     parts = [_axes(frame, "wall time of a frame, ms", "MSE ×1e-5"), _front(frame, pareto_front(real))]
+    parts += [_exact_line(frame, ms) for ms in exact]
     for technique in technique_order(name for name, _ in points):
         own = sorted((budget, *points[name, budget]) for name, budget in points if name == technique)
         parts.append(_series(frame, technique, own))
@@ -100,26 +104,17 @@ def time_error_chart(rows: Sequence[Row], label: str) -> str:
 
 
 def training_chart(history: Sequence[TrainingPoint]) -> str:
-    """Training and validation loss by step; '' with fewer than two points."""
+    """Error over the optimum on the training views, by step; '' with fewer than two points."""
     if len(history) < 2:
         return ""
-    training = [(float(p.step), p.training) for p in history]
-    validation = [(float(p.step), p.validation) for p in history if p.validation is not None]
-    values = [y for _, y in training + validation]
+    points = [(float(p.step), p.over_optimum) for p in history]
+    values = [y for _, y in points]
+    steps = (points[0][0], max(points[-1][0], points[0][0] + 1.0))
     span = (max(values) - min(values)) or max(abs(values[0]), 1.0)
-    steps = (training[0][0], max(training[-1][0], training[0][0] + 1.0))
-    frame = Frame(
-        steps,
-        (min(values) - 0.05 * span, max(values) + 0.05 * span),
-        log_x=False,
-        log_y=False,
-        width=640.0,
-        height=280.0,
-    )
-    parts = [_axes(frame, "step", "mean log(1 + regret)"), _line(frame, training, "line training")]
-    if validation:
-        parts.append(_line(frame, validation, "line validation"))
-    return _svg(frame, parts, "Loss by training step")
+    heights = (min(values) - 0.05 * span, max(values) + 0.05 * span)
+    frame = Frame(steps, heights, log_x=False, log_y=False, width=640.0, height=280.0)
+    parts = [_axes(frame, "step", "error / optimum"), _line(frame, points, "line training")]
+    return _svg(frame, parts, "Squared error over the optimum's, by training step")
 
 
 def legend(techniques: Sequence[str]) -> str:
@@ -144,6 +139,14 @@ def _series(frame: Frame, technique: str, points: Sequence[tuple[float, float, f
         for budget, x, y in points
     )
     return f'<g class="t-{escape(technique)}"><polyline class="link" points="{path}"/>{marks}</g>'
+
+
+def _exact_line(frame: Frame, ms: float) -> str:
+    x = frame.px(ms)
+    line = f'<path class="exact" d="M{x:.1f} {frame.top}V{frame.height - frame.bottom}"/>'
+    return f'<g class="mark">{line}<title>exact: {number(ms)} ms</title></g>' + _text(
+        "point", "start", x + 4, frame.top + 10, "exact"
+    )
 
 
 def _front(frame: Frame, front: Sequence[tuple[float, float]]) -> str:

@@ -112,7 +112,7 @@ def _train(work: Workspace, training: Sequence[LabelledView], address: Address) 
         result = train(data, (), config, progress, checkpoint)
         save_weights(made / "weights.safetensors", result.weights)
         points = [
-            TrainingPoint(step=point.step, training=point.loss, validation=point.score).model_dump()
+            TrainingPoint(step=point.step, loss=point.loss, over_optimum=point.score).model_dump()
             for point in result.history
         ]
         (made / "history.json").write_text(json.dumps(points), encoding="utf-8")

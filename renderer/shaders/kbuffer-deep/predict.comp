@@ -9,7 +9,7 @@ layout(std430, binding = 1) readonly buffer Nearest { uint z_min[]; };
 layout(std430, binding = 2) readonly buffer Farthest { uint z_max[]; };
 layout(std430, binding = 3) readonly buffer NearestColour { uint nearest_colour[]; };
 layout(std430, binding = 4) writeonly buffer Gain { vec2 gain[]; };
-layout(binding = 0) uniform sampler2D sums[5];
+layout(binding = 0) uniform sampler2D sums[5];  // units 0..4; a compiler may drop those the bundle does not read
 layout(binding = 5) uniform sampler2D background;
 uniform int width;
 uniform int pixels;

@@ -88,11 +88,20 @@ def test_one_point_is_drawn_too() -> None:
 
 @pytest.mark.parametrize("losses", [(1.0, 0.5, 0.4), (0.0, 0.0), (1.0, 1.0)])
 def test_the_training_chart_is_well_formed(losses: tuple[float, ...]) -> None:
-    history = [TrainingPoint(step=10 * i, training=loss, validation=loss / 2) for i, loss in enumerate(losses)]
+    history = [TrainingPoint(step=10 * i, loss=loss, over_optimum=2 * loss) for i, loss in enumerate(losses)]
     svg = ElementTree.fromstring(charts.training_chart(history))
     lines = list(svg.iter("polyline"))
-    assert [len((line.get("points") or "").split()) for line in lines] == [len(losses), len(losses)]
+    assert [len((line.get("points") or "").split()) for line in lines] == [len(losses)]
 
 
 def test_a_training_of_one_point_makes_no_chart() -> None:
-    assert charts.training_chart([TrainingPoint(step=0, training=1.0)]) == ""
+    assert charts.training_chart([TrainingPoint(step=0, loss=1.0, over_optimum=2.0)]) == ""
+
+
+def test_the_exact_technique_is_a_line_at_its_time() -> None:
+    exact = [m.model_copy(update={"technique": "sbuffer", "exact": True, "mse": 0.0}) for m in example()[:1]]
+    made = rows([*example(), *exact])
+    assert [row.technique for row in made].count("sbuffer") == 1
+    svg = ElementTree.fromstring(charts.time_error_chart(made, "all"))
+    assert [path for path in svg.iter("path") if path.get("class") == "exact"]
+    assert not [group for group in svg.iter("g") if group.get("class") == "t-sbuffer"]

@@ -53,7 +53,10 @@ def report_data(**changes: Any) -> ReportData:
                 scene="bottles", view="front", budget_factor=1.0, error=2.0, bound=1.9, gap=0.05, greedy_error=3.0
             ),
         ),
-        "training": (TrainingPoint(step=0, training=1.0, validation=1.1), TrainingPoint(step=10, training=0.5)),
+        "training": (
+            TrainingPoint(step=0, loss=1.0, over_optimum=3.0),
+            TrainingPoint(step=10, loss=0.5, over_optimum=2.5),
+        ),
         "registry": RegistryResult(
             reference="glass@1.0.0", folder="/state/1.0.0", champion=True, reason="It is the first version.", score=0.2
         ),
