@@ -127,6 +127,6 @@ def _background(frame: Frame) -> NDArray[np.uint8]:
 
 
 def _facing(frame: Frame) -> NDArray[np.uint8]:
-    gathered = frame.gather(full=True)
-    assert gathered.nearest_facing is not None, "a full gather has the nearest fragment"
+    gathered = frame.gather("gather-nearest")
+    assert gathered.nearest_facing is not None, "this gather has the nearest fragment"
     return np.frombuffer(gathered.nearest_facing.read(4 * frame.pixels), dtype=np.uint32).astype(np.uint8)

@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Literal
 
 import moderngl
 import numpy as np
@@ -20,6 +21,9 @@ from schemas.view import View
 
 RGB = tuple[float, float, float]
 
+Gather = Literal["gather-tail", "gather-nearest", "gather"]
+"""What a gather pass leaves: the tail's sums; also the nearest fragment; also all other sums. Names of the passes."""
+
 # Shader storage bindings that several passes share.
 COUNT, Z_MIN, Z_MAX, NEAREST_COLOUR, NEAREST_FACING = range(5)
 
@@ -29,7 +33,7 @@ class Gathered:
     """Order-independent sums of a frame, on the GPU.
 
     Attributes:
-        sums: RGBA32F textures: `gather/gather.frag` says what each holds; one if only the tail needs it, else five.
+        sums: RGBA32F textures: `gather/gather.frag` says what each holds; five of a `gather`, else the first.
         nearest_colour: uint32 [P], packed colour of the nearest fragment, all ones where none; None if not gathered.
         nearest_facing: uint32 [P], its |n . e| * 255; None if not gathered.
     """
@@ -83,7 +87,7 @@ class Frame:
         self.depth = self.ctx.depth_renderbuffer((width, height))
         self._counts: moderngl.Buffer | None = None
         self._range: tuple[moderngl.Buffer, moderngl.Buffer] | None = None
-        self._gathered: dict[bool, Gathered] = {}
+        self._gathered: dict[Gather, Gathered] = {}
         self._count_array: NDArray[np.uint32] | None = None
         with self.clock.measure("opaque"):
             self._draw_opaque(clear)
@@ -182,19 +186,20 @@ class Frame:
             self.ctx.memory_barrier()
         return self._counts, *self._range
 
-    def gather(self, full: bool) -> Gathered:
-        """The sums of every pixel: all of them with the nearest fragment, or only what the density tail needs."""
-        if full not in self._gathered:
+    def gather(self, what: Gather) -> Gathered:
+        """The order-independent sums of every pixel, by one additive pass."""
+        if what not in self._gathered:
             _, z_min, z_max = self.depth_range()
-            with self.clock.measure("gather" if full else "gather-tail"):
-                self._gathered[full] = self._gather(full, z_min, z_max)
-        return self._gathered[full]
+            with self.clock.measure(what):
+                self._gathered[what] = self._gather(what, z_min, z_max)
+        return self._gathered[what]
 
-    def _gather(self, full: bool, z_min: moderngl.Buffer, z_max: moderngl.Buffer) -> Gathered:
+    def _gather(self, what: Gather, z_min: moderngl.Buffer, z_max: moderngl.Buffer) -> Gathered:
+        full, nearest = what == "gather", what != "gather-tail"
         made = Gathered([self.ctx.texture((self.width, self.height), 4, dtype="f4") for _ in range(5 if full else 1)])
         z_min.bind_to_storage_buffer(Z_MIN)
         z_max.bind_to_storage_buffer(Z_MAX)
-        if full:
+        if nearest:
             made.nearest_colour = self.buffer(self.pixels, 0xFFFFFFFF)
             made.nearest_facing = self.buffer(self.pixels, 0)
             made.nearest_colour.bind_to_storage_buffer(NEAREST_COLOUR)
@@ -203,6 +208,6 @@ class Frame:
         for texture in made.sums:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
             self.ctx.framebuffer([texture]).clear(0.0, 0.0, 0.0, 0.0)
-        self.draw_transparent("gather/gather.frag", target, {"FULL": int(full), "NEAREST": int(full)})
+        self.draw_transparent("gather/gather.frag", target, {"FULL": int(full), "NEAREST": int(nearest)})
         self.ctx.memory_barrier()
         return made

@@ -81,7 +81,7 @@ class Certificate(_Record):
         error: Sum over pixels of the squared error of the allocation.
         bound: No allocation of this budget has a smaller sum (Lagrangian dual).
         gap: (error - bound) / error; 0 where the error is 0.
-        greedy_error: The same sum for Algorithm 1, for comparison.
+        rules: The same sum for every other rule of allocation, by name.
     """
 
     scene: str
@@ -90,7 +90,7 @@ class Certificate(_Record):
     error: float = Field(ge=0.0)
     bound: float
     gap: float
-    greedy_error: float | None = Field(default=None, ge=0.0)
+    rules: dict[str, float] = {}
 
 
 class TrainingPoint(_Record):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.csr import offsets_of
-from renderer.frame import Clock, Frame
+from renderer.frame import Clock, Frame, Gather
 from renderer.gpu_scene import set_uniforms
 from renderer.techniques.base import Budget, Rendered
 from schemas.tail import MAX_EXPONENT, TailName
@@ -28,7 +28,11 @@ _OFFSETS, _DEPTHS, _COLOURS, _Z_MIN, _Z_MAX = range(5)
 
 
 def render_chain(
-    frame: Frame, slots: NDArray[np.integer], n: NDArray[np.integer], budget: Budget, before: tuple[str, ...]
+    frame: Frame,
+    slots: NDArray[np.integer],
+    n: NDArray[np.integer],
+    budget: Budget,
+    gathered: Gather | None = None,
 ) -> Rendered:
     """Capture the nearest fragments into given slots, add the tail, resolve.
 
@@ -37,19 +41,17 @@ def render_chain(
         slots: int [P], slots a pixel gets; may exceed n(p), then some stay empty.
         n: int [P], fragments of each pixel.
         budget: Tail and its constant; `sum slots` is not checked against it here.
-        before: Names of the frame's passes that this technique needed so far.
+        gathered: What the technique has gathered to choose its slots, if anything.
 
     Returns:
         The picture; passes in order, memory as allocated.
     """
-    needed = list(before)
-    full = "gather" in before
-    if budget.tail == "density":
-        # Whoever has the full sums has the tail's; the small gather is for techniques that have none.
-        frame.gather(full)
-        needed += [] if full else ["gather-tail"]
+    if gathered is None and budget.tail == "density":
+        gathered = "gather-tail"
+    sums = None if gathered is None else frame.gather(gathered).sums[0]
+    needed = ["count"] if gathered is None else ["count", gathered]
     clock = Clock(frame.ctx)
-    image, pool_bytes = _passes(frame, clock, slots, budget, full)
+    image, pool_bytes = _passes(frame, clock, slots, budget, sums)
     k = np.minimum(slots, n).astype(np.int32)
     return Rendered(
         linear=image,
@@ -63,12 +65,12 @@ def render_chain(
 
 def _bytes_a_pixel(needed: list[str]) -> int:
     """Offsets and the tail's two targets, and what the passes before left alive."""
-    live = {"count": 12, "gather-tail": 16, "gather": 5 * 16 + 8}
+    live = {"count": 12, "gather-tail": 16, "gather-nearest": 16 + 8, "gather": 5 * 16 + 8}
     return 4 + 2 * 16 + sum(live.get(name, 0) for name in needed)
 
 
 def _passes(
-    frame: Frame, clock: Clock, slots: NDArray[np.integer], budget: Budget, full: bool
+    frame: Frame, clock: Clock, slots: NDArray[np.integer], budget: Budget, sums: moderngl.Texture | None
 ) -> tuple[NDArray[np.float32], int]:
     with clock.measure("prefix"):
         offsets = offsets_of(slots)
@@ -81,23 +83,23 @@ def _passes(
         frame.draw_transparent("kbuffer/chain_depth.frag", frame.target([]))
         frame.ctx.memory_barrier()
     with clock.measure("chain-colour"):
-        tails = _chain_colour(frame, budget, full)
+        tails = _chain_colour(frame, budget, sums)
     with clock.measure("resolve"):
         target = resolve(frame, _TAIL_CODES[budget.tail], tails)
     image = read_linear(frame, target)
     return image, SLOT_BYTES * total
 
 
-def _chain_colour(frame: Frame, budget: Budget, full: bool) -> list[moderngl.Texture]:
+def _chain_colour(frame: Frame, budget: Budget, sums: moderngl.Texture | None) -> list[moderngl.Texture]:
     tails = [frame.ctx.texture((frame.width, frame.height), 4, dtype="f4") for _ in range(2)]
     target = frame.target(tails)
     for tail in tails:
         frame.ctx.framebuffer([tail]).clear(0.0, 0.0, 0.0, 0.0)
-    if budget.tail == "density":
+    if sums is not None:
         _, z_min, z_max = frame.depth_range()
         z_min.bind_to_storage_buffer(_Z_MIN)
         z_max.bind_to_storage_buffer(_Z_MAX)
-        frame.gather(full).sums[0].use(0)
+        sums.use(0)
     defines = {"TAIL": _TAIL_CODES[budget.tail], "MAX_EXPONENT": MAX_EXPONENT}
     frame.draw_transparent("kbuffer/chain_colour.frag", target, defines, gathered=0, density_g=budget.g)
     frame.ctx.memory_barrier()

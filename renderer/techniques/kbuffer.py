@@ -18,4 +18,4 @@ class KBuffer:
         """Render a frame with the same number of slots everywhere."""
         n = frame.count()
         slots = np.full(frame.pixels, budget.fragments // frame.pixels, dtype=np.int32)
-        return render_chain(frame, slots, n, budget, before=("count",))
+        return render_chain(frame, slots, n, budget)

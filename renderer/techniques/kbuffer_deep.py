@@ -42,10 +42,10 @@ class KBufferDeep:
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame with predicted slots; the budget is met exactly where it is below N."""
         n = frame.count()
-        frame.gather(full=True)
+        frame.gather("gather")
         clock = Clock(frame.ctx)
         slots = self._allocate(frame, n, budget.fragments, clock)
-        rendered = render_chain(frame, slots, n, budget, before=("count", "gather"))
+        rendered = render_chain(frame, slots, n, budget, gathered="gather")
         rendered.passes.update(clock.passes)
         return rendered
 
@@ -75,7 +75,7 @@ class KBufferDeep:
         Returns:
             float32 [M, 2]: a and b of `log gain(k) = a - b (k - 1)`.
         """
-        gathered = frame.gather(full=True)
+        gathered = frame.gather("gather")
         assert gathered.nearest_colour is not None, "a full gather has the nearest fragment"
         _, z_min, z_max = frame.depth_range()
         program = frame.gpu.programs.compute("kbuffer-deep/predict.comp", {"bundle/predict.glsl": self._glsl})

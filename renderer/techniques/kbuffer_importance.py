@@ -26,13 +26,13 @@ class KBufferImportance:
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame with slots by importance."""
         n = frame.count()
-        gathered = frame.gather(full=True)
-        assert gathered.nearest_facing is not None, "a full gather has the nearest fragment"
+        gathered = frame.gather("gather-nearest")
+        assert gathered.nearest_facing is not None, "this gather has the nearest fragment"
         clock = Clock(frame.ctx)
         with clock.measure("importance"):
             facing = np.frombuffer(gathered.nearest_facing.read(4 * frame.pixels), dtype=np.uint32).astype(np.uint8)
             weights = vkb_importance(n, facing, frame.width, frame.height, self._options)
             slots = budget_fill(weights, n, budget.fragments, feasible_k_min(n, budget.fragments))
-        rendered = render_chain(frame, slots, n, budget, before=("count", "gather"))
+        rendered = render_chain(frame, slots, n, budget, gathered="gather-nearest")
         rendered.passes.update(clock.passes)
         return rendered

@@ -24,4 +24,4 @@ class KBufferOptimal:
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame with the given slots."""
-        return render_chain(frame, self._k, frame.count(), budget, before=("count",))
+        return render_chain(frame, self._k, frame.count(), budget)

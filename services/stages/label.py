@@ -39,14 +39,12 @@ class LabelledView:
         rendered: The view.
         address: Of the label artifact.
         folder: Where it is.
-        errors: Squared error summed over pixels and channels: rule -> one per budget.
-        certificates: Of the optimal allocation, one per budget.
+        certificates: Of the optimal allocation, and the errors of the other rules, one per budget.
     """
 
     rendered: RenderedView
     address: Address
     folder: Path
-    errors: dict[str, list[float]]
     certificates: tuple[Certificate, ...]
 
     @property
@@ -90,13 +88,15 @@ def _label(work: Workspace, view: RenderedView) -> LabelledView:
     facts = json.loads((folder / _FACTS).read_text(encoding="utf-8"))
     certificates = [
         Certificate(
-            scene=view.scene.label, view=view.view.name, budget_factor=factor, greedy_error=greedy, **certificate
+            scene=view.scene.label,
+            view=view.view.name,
+            budget_factor=factor,
+            rules={rule: errors[index] for rule, errors in facts["errors"].items() if rule != "optimal"},
+            **facts["certificates"][index],
         )
-        for factor, certificate, greedy in zip(
-            options.budgets, facts["certificates"], facts["errors"]["greedy"], strict=True
-        )
+        for index, factor in enumerate(options.budgets)
     ]
-    return LabelledView(view, address, folder, facts["errors"], tuple(certificates))
+    return LabelledView(view, address, folder, tuple(certificates))
 
 
 def _make(work: Workspace, dump: FragmentDump, folder: Path) -> None:

@@ -69,7 +69,7 @@ def test_row_bands_cover_every_fragment_once_within_capacity() -> None:
 
 
 def test_gathered_sums_equal_those_of_the_dump(frame: Frame, dump: FragmentDump) -> None:
-    made = frame.gather(full=True)
+    made = frame.gather("gather")
     texels = [np.frombuffer(t.read(), dtype=np.float32).reshape(-1, 4) for t in made.sums]
     expected = gather(dump)
     occupied = dump.counts > 0

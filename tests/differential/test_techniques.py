@@ -79,7 +79,14 @@ def test_a_picture_is_identical_from_run_to_run(gl: moderngl.Context, frame: Fra
 
 def test_every_pass_and_byte_is_reported(frame: Frame, dump: FragmentDump) -> None:
     rendered = KBufferImportance().render(frame, Budget(dump.total // 4))
-    assert {"opaque", "count", "gather", "importance", "prefix", "chain-depth", "chain-colour", "resolve"} == set(
-        rendered.passes
-    )
+    assert {
+        "opaque",
+        "count",
+        "gather-nearest",
+        "importance",
+        "prefix",
+        "chain-depth",
+        "chain-colour",
+        "resolve",
+    } == set(rendered.passes)
     assert rendered.total_bytes > rendered.pool_bytes == 8 * (dump.total // 4)

@@ -50,7 +50,7 @@ def report_data(**changes: Any) -> ReportData:
         "measurements": tuple(example() + example("foliage")),
         "certificates": (
             Certificate(
-                scene="bottles", view="front", budget_factor=1.0, error=2.0, bound=1.9, gap=0.05, greedy_error=3.0
+                scene="bottles", view="front", budget_factor=1.0, error=2.0, bound=1.9, gap=0.05, rules={"greedy": 3.0}
             ),
         ),
         "training": (
