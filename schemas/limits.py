@@ -11,8 +11,8 @@ class Limits:
 
     pixels: int = 7680 * 4320
     """Pixels of one view: one word a pixel must fit a storage buffer."""
-    fragments: int = 400_000_000
-    """Transparent fragments of one view."""
+    fragments: int = 250_000_000
+    """Transparent fragments of one view: labelling takes up to 32 bytes for each."""
     buffer_bytes: int = 128 * 1024 * 1024
     """Bytes of one shader storage buffer: what llvmpipe advertises; larger captures go in bands of rows."""
 

@@ -96,17 +96,22 @@ class Shot:
         if self.fragments >= self.session.view.rendered.total:
             why = "the budget holds every fragment: every technique is exact"
             return self._record(name, exact=True, skipped=why, mse=0.0)
-        options = self.session.work.options
-        rendered = self.session.render(make, Budget(self.fragments, options.tail, options.g))
-        return self._measure(name, rendered, exact=False)
+        return self._take(name, make, exact=False)
 
     def take_exact(self) -> Measurement:
         """Render with all fragments: what it costs is the memory it needs."""
+        return self._take(SBuffer.name, lambda _: SBuffer(), exact=True)
+
+    def _take(self, name: str, make: Callable[[Frame], Technique], exact: bool) -> Measurement:
+        options = self.session.work.options
         try:
-            rendered = self.session.render(lambda _: SBuffer(), Budget(self.fragments))
-        except Problem as problem:  # more fragments than a storage buffer holds: the others can still be measured
-            return self._record(SBuffer.name, exact=True, skipped=problem.title)
-        return self._measure(SBuffer.name, rendered, exact=True)
+            rendered = self.session.render(make, Budget(self.fragments, options.tail, options.g))
+        except Problem as problem:
+            if problem.code != ExitCode.LIMIT:
+                raise
+            # More fragments than a storage buffer holds: the others can still be measured.
+            return self._record(name, exact=exact, skipped=problem.title)
+        return self._measure(name, rendered, exact)
 
     def _measure(self, name: str, rendered: Rendered, exact: bool) -> Measurement:
         image, reference = display8(rendered.linear), self.session.exact

@@ -27,24 +27,30 @@ vec3 srgb_to_linear(vec3 c) {
 }
 #endif
 
+// Opposite normals of neighbouring vertices interpolate through zero, which has no direction.
+vec3 direction(vec3 v) {
+    float square = dot(v, v);
+    return square > 0.0 ? v * inversesqrt(square) : vec3(0.0, 0.0, 1.0);
+}
+
 vec3 eye_direction() {
-    return orthographic ? vec3(0.0, 0.0, 1.0) : normalize(v_view);
+    return orthographic ? vec3(0.0, 0.0, 1.0) : direction(v_view);
 }
 
 // |n . e|: 1 facing the eye, 0 at a silhouette.
 float facing() {
-    return clamp(abs(dot(normalize(v_normal), eye_direction())), 0.0, 1.0);
+    return clamp(abs(dot(direction(v_normal), eye_direction())), 0.0, 1.0);
 }
 
 // Two-sided diffuse light from above the viewer's left shoulder, a sky that is brighter along `up`, a small highlight.
 vec3 shade(vec3 albedo) {
     vec3 eye = eye_direction();
-    vec3 normal = normalize(v_normal);
+    vec3 normal = direction(v_normal);
     normal = dot(normal, eye) < 0.0 ? -normal : normal;
     const vec3 light = normalize(vec3(-0.5, 0.8, 0.9));
     float diffuse = max(dot(normal, light), 0.0);
     float sky = 0.5 + 0.5 * dot(normal, up_view);
-    float highlight = max(dot(normal, normalize(light + eye)), 0.0);
+    float highlight = max(dot(normal, direction(light + eye)), 0.0);
     highlight *= highlight; highlight *= highlight; highlight *= highlight; highlight *= highlight; highlight *= highlight;
     return albedo * (0.25 + 0.3 * sky + 0.6 * diffuse) + 0.25 * highlight;
 }
