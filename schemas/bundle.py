@@ -27,6 +27,9 @@ FILES: Final = (WEIGHTS, ONNX, GLSL)
 GAIN_FLOOR: Final = 0.02
 """`b = softplus(.) + GAIN_FLOOR`: log gain lost per fragment is at least this, so that 1 / b stays finite."""
 
+FEATURE_LIMIT: Final = 4.0
+"""Normalised features are clamped to this, either way: beyond it no training data says what a network would answer."""
+
 MAX_MANIFEST_BYTES: Final = 1 << 20
 MAX_FILE_BYTES: Final = 64 << 20
 
@@ -34,7 +37,7 @@ _STRICT = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class FeatureSpec(BaseModel):
-    """One input of the network: a name of `renderer.features.FEATURES`, normalised as `(x - mean) / std`."""
+    """One input of the network, normalised as `clamp((x - mean) / std, -FEATURE_LIMIT, FEATURE_LIMIT)`."""
 
     model_config = _STRICT
 

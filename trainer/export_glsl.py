@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from renderer.features import features_glsl
-from schemas.bundle import GAIN_FLOOR
+from schemas.bundle import FEATURE_LIMIT, GAIN_FLOOR
 from trainer.weights import Layer, Weights
 
 
@@ -22,13 +22,16 @@ def glsl_source(weights: Weights) -> str:
         ValueError: A weight is not finite.
     """
     body: list[str] = []
-    inputs = [f"x[{i}]" for i in range(len(weights.features))]
-    for i, layer in enumerate(weights.folded[:-1]):
+    inputs = [f"f{i}" for i in range(len(weights.features))]
+    limit = _literal(np.float32(FEATURE_LIMIT))
+    for i, (name, mean, std) in enumerate(zip(inputs, weights.mean, weights.std, strict=True)):
+        body.append(f"    float {name} = clamp((x[{i}] - {_literal(mean)}) / {_literal(std)}, -{limit}, {limit});")
+    for i, layer in enumerate(weights.layers[:-1]):
         outputs = [f"h{i}_{j}" for j in range(len(layer[1]))]
         for name, terms in zip(outputs, _dense(layer, inputs), strict=True):
             body.append(f"    float {name} = max(0.0, {terms});")
         inputs = outputs
-    a, b = _dense(weights.folded[-1], inputs)
+    a, b = _dense(weights.layers[-1], inputs)
     body += [f"    float a = {a};", f"    float b = {b};"]
     return "\n".join(
         [

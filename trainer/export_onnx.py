@@ -9,7 +9,7 @@ import onnx
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
-from schemas.bundle import GAIN_FLOOR
+from schemas.bundle import FEATURE_LIMIT, GAIN_FLOOR
 from trainer.weights import Weights
 
 OPSET: Final = 17
@@ -20,7 +20,7 @@ IR_VERSION: Final = 8
 def onnx_model(weights: Weights) -> bytes:
     """Serialised model: input `features` float32 [pixels, F] (raw, in the manifest's order), outputs `a`, `b` [pixels].
 
-    The normalisation is folded into the first layer.
+    The normalisation is not folded into the first layer: with a feature of small spread that would cancel in float32.
     """
     nodes: list[onnx.NodeProto] = []
     constants: list[onnx.TensorProto] = []
@@ -29,9 +29,17 @@ def onnx_model(weights: Weights) -> bytes:
         constants.append(numpy_helper.from_array(np.ascontiguousarray(value), name))
         return name
 
-    current = "features"
-    last = len(weights.folded) - 1
-    for i, (weight, bias) in enumerate(weights.folded):
+    low, high = (
+        constant(name, np.array(sign * FEATURE_LIMIT, dtype=np.float32)) for name, sign in (("low", -1), ("high", 1))
+    )
+    nodes += [
+        helper.make_node("Sub", ["features", constant("mean", weights.mean)], ["centred"]),
+        helper.make_node("Div", ["centred", constant("std", weights.std)], ["scaled"]),
+        helper.make_node("Clip", ["scaled", low, high], ["normalised"]),
+    ]
+    current = "normalised"
+    last = len(weights.layers) - 1
+    for i, (weight, bias) in enumerate(weights.layers):
         inputs = [current, constant(f"layer{i}.weight", weight), constant(f"layer{i}.bias", bias)]
         nodes.append(helper.make_node("Gemm", inputs, [f"dense{i}"], transB=1))
         current = f"dense{i}"

@@ -9,7 +9,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from schemas.bundle import GAIN_FLOOR
+from schemas.bundle import FEATURE_LIMIT, GAIN_FLOOR
 from trainer.weights import Weights
 
 
@@ -49,7 +49,7 @@ class GainCurve(nn.Module):
         Returns:
             a, b: float32 [R]; b >= GAIN_FLOOR.
         """
-        x = (x - self.mean) / self.std
+        x = torch.clamp((x - self.mean) / self.std, -FEATURE_LIMIT, FEATURE_LIMIT)
         for layer in self.layers[:-1]:
             x = torch.relu(layer(x))
         out = self.layers[-1](x)

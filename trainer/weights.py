@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from safetensors import safe_open
 from safetensors.numpy import save_file
 
 from renderer.features import FEATURES
-from schemas.bundle import GAIN_FLOOR
+from schemas.bundle import FEATURE_LIMIT, GAIN_FLOOR
 
 Layer = tuple[NDArray[np.float32], NDArray[np.float32]]
 """Weight float32 [out, in] and bias float32 [out]."""
@@ -48,14 +47,6 @@ class Weights:
         """Units of each hidden layer."""
         return tuple(len(bias) for _, bias in self.layers[:-1])
 
-    @cached_property
-    def folded(self) -> tuple[Layer, ...]:
-        """The layers with the normalisation folded into the first: they read raw features. Folded in float64."""
-        weight, bias = self.layers[0]
-        scaled = weight.astype(np.float64) / self.std
-        shifted = bias - scaled @ self.mean.astype(np.float64)
-        return ((scaled.astype(np.float32), shifted.astype(np.float32)), *self.layers[1:])
-
     def predict(self, features: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Gain curves of pixels.
 
@@ -68,10 +59,10 @@ class Weights:
         a, b = (np.empty(len(features), dtype=np.float32) for _ in range(2))
         for start in range(0, len(features), _CHUNK):
             part = slice(start, start + _CHUNK)
-            x = features[part, self.columns]
-            for weight, bias in self.folded[:-1]:
+            x = np.clip((features[part, self.columns] - self.mean) / self.std, -FEATURE_LIMIT, FEATURE_LIMIT)
+            for weight, bias in self.layers[:-1]:
                 x = np.maximum(x @ weight.T + bias, np.float32(0.0))
-            weight, bias = self.folded[-1]
+            weight, bias = self.layers[-1]
             out = x @ weight.T + bias
             # softplus, without overflow
             a[part] = out[:, 0]

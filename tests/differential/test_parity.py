@@ -11,7 +11,7 @@ import pytest
 from support.training import random_weights, real_features
 
 from renderer.features import FEATURES
-from schemas.bundle import GLSL, ONNX
+from schemas.bundle import FEATURE_LIMIT, GLSL, ONNX
 from schemas.problem import Problem
 from trainer.export_glsl import glsl_source
 from trainer.export_onnx import OPSET, onnx_model
@@ -53,12 +53,37 @@ def test_any_number_of_rows_works(gl: moderngl.Context, tmp_path: Path) -> None:
 
 
 def test_softplus_neither_overflows_nor_vanishes(gl: moderngl.Context, tmp_path: Path) -> None:
-    layer = (np.array([[0.0], [1.0]], np.float32), np.zeros(2, np.float32))
-    weights = Weights(("log_n",), np.zeros(1, np.float32), np.ones(1, np.float32), (layer,))
+    # Normalised inputs are clamped, so the spread of the feature and the weight make the large values.
+    layer = (np.array([[0.0], [1000.0]], np.float32), np.zeros(2, np.float32))
+    weights = Weights(("log_n",), np.zeros(1, np.float32), np.full(1, 1000.0, np.float32), (layer,))
     write(tmp_path, weights)
     inputs = np.array([[-200.0], [-20.0], [0.0], [20.0], [3000.0]], np.float32)
     for outputs in (onnx_outputs(tmp_path / ONNX, inputs), glsl_outputs(tmp_path / GLSL, inputs, gl)):
         np.testing.assert_allclose(outputs[:, 1], [0.02, 0.02, np.log(2.0) + 0.02, 20.02, 3000.02], rtol=1e-5)
+
+
+def test_inputs_beyond_the_training_data_are_clamped_alike(gl: moderngl.Context, tmp_path: Path) -> None:
+    weights = random_weights(4, FEATURES[:3], (8,))
+    write(tmp_path, weights)
+    far = (weights.mean + 50.0 * weights.std * np.array([[1.0, -1.0, 1.0]])).astype(np.float32)
+    edge = (weights.mean + FEATURE_LIMIT * weights.std * np.array([[1.0, -1.0, 1.0]])).astype(np.float32)
+    expected = torch_outputs(weights, edge)
+    for outputs in (
+        torch_outputs(weights, far),
+        onnx_outputs(tmp_path / ONNX, far),
+        glsl_outputs(tmp_path / GLSL, far, gl),
+    ):
+        np.testing.assert_allclose(outputs, expected, rtol=1e-5, atol=1e-5)
+
+
+def test_features_of_hardly_any_spread_keep_parity(gl: moderngl.Context, tmp_path: Path) -> None:
+    weights = random_weights(5, FEATURES[:3], (8,))
+    narrow = Weights(weights.features, np.full(3, 0.33, np.float32), np.full(3, 1e-4, np.float32), weights.layers)
+    write(tmp_path, narrow)
+    inputs = (0.33 + np.random.default_rng(0).normal(0.0, 1e-4, (5000, 3))).astype(np.float32)
+    truth = torch_outputs(narrow, inputs)
+    np.testing.assert_allclose(onnx_outputs(tmp_path / ONNX, inputs), truth, rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(glsl_outputs(tmp_path / GLSL, inputs, gl), truth, rtol=1e-5, atol=1e-5)
 
 
 def test_the_onnx_file_is_as_promised() -> None:
