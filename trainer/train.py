@@ -39,8 +39,8 @@ class TrainConfig(BaseModel):
 
     Attributes:
         seed: Seed of the initial weights and of the batches.
-        steps: Steps of Adam; the learning rate falls along a cosine. Longer training fits the training assets better and
-            held-out ones no better, some worse.
+        steps: Steps of Adam; the learning rate falls along a cosine. Longer training fits the training assets better
+            and held-out ones no better, some worse.
         batch: Rows per step.
         lr: First learning rate.
         hidden: Units of the hidden layers.
