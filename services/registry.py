@@ -127,7 +127,16 @@ class Registry:
     def aliases(self, name: str) -> Aliases:
         """Aliases of a name and their history."""
         path = self.root / check_name(name) / "aliases.json"
-        return Aliases.model_validate_json(path.read_bytes()) if path.is_file() else Aliases()
+        if not path.is_file():
+            return Aliases()
+        try:
+            return Aliases.model_validate_json(path.read_bytes())
+        except ValueError as error:
+            raise Problem(
+                f"The aliases in {path} cannot be read.",
+                f"Remove that file; `diaphane models promote {name} VERSION --reason TEXT` then names a champion.",
+                ExitCode.CONFLICT,
+            ) from error
 
     def champion(self, name: str) -> Publication | None:
         """The version that the alias `champion` means, if there is one yet."""

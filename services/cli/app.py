@@ -71,6 +71,8 @@ def run(arguments: Sequence[str]) -> int:
         # Whoever read our output has left, as `head` does; nothing more can be written, not even at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return int(ExitCode.CHECK_FAILED)
+    except OSError as error:
+        return output.show_problem(_disk(error), as_json=as_json)
     except Exception as error:
         state = Path(os.environ.get(STATE_VARIABLE, DEFAULT_STATE))
         return output.show_problem(output.unexpected(error, state), as_json=as_json)
@@ -88,6 +90,16 @@ def _call(arguments: Sequence[str]) -> int:
     except (KeyboardInterrupt, Abort):
         return ExitCode.INTERRUPTED
     return int(status or 0)  # typer itself gives 130 for an interrupt within a command
+
+
+def _disk(error: OSError) -> Problem:
+    """A full disk, a read-only or missing folder: nothing is wrong with the command, so it can be run again."""
+    where = f"{error.filename}: " if error.filename else ""
+    return Problem(
+        f"{where}{error.strerror or error}.",
+        "Make room, or name a folder that can be written with --state; the same command then continues.",
+        ExitCode.TRY_AGAIN,
+    )
 
 
 def _usage(error: TyperException, as_json: bool) -> int:

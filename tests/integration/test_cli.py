@@ -296,3 +296,17 @@ def test_a_real_interrupt_ends_with_130(tmp_path: Path) -> None:
     assert child.returncode == ExitCode.INTERRUPTED
     assert b"Continue with: diaphane build" in err
     assert b"Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    "error", [OSError(28, "No space left on device", "st/dump"), OSError(30, "Read-only file system")]
+)
+def test_a_disk_that_cannot_be_written_is_worth_another_try(
+    error: OSError, pipeline: Callable[[Build], list[BuildOptions]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    pipeline(raising(error))
+    assert run(["build", "bottles.usda", "foliage.usda", "--name", "glass"]) == ExitCode.TRY_AGAIN
+    message = capsys.readouterr().err
+    assert str(error.strerror) in message
+    assert "--state" in message
+    assert "Traceback" not in message

@@ -169,3 +169,12 @@ def test_an_unreadable_publication_is_a_problem_that_names_it(registry: Registry
     (registry.root / "glass" / "versions" / "1.0.0" / "publication.json").write_text("{}")
     with pytest.raises(Problem, match=r"versions/1\.0\.0 cannot be read"):
         registry.resolve("glass")
+
+
+@pytest.mark.parametrize("content", ["", "{nope", '{"aliases": 3}'])
+def test_damaged_aliases_are_named_with_the_way_out(registry: Registry, tmp_path: Path, content: str) -> None:
+    publish(registry, tmp_path, "a")
+    (registry.root / "glass" / "aliases.json").write_text(content)
+    with pytest.raises(Problem, match=r"aliases\.json.*models promote glass") as caught:
+        registry.champion("glass")
+    assert caught.value.code == ExitCode.CONFLICT
