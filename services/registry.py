@@ -187,6 +187,7 @@ class Registry:
             published = self.versions(name)
             for publication in published:
                 if publication.digest == digest:
+                    self._repair(bundle, publication)
                     return publication
             publication = Publication(
                 name=name,
@@ -260,6 +261,13 @@ class Registry:
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
 
+    def _repair(self, bundle: Path, publication: Publication) -> None:
+        """Writes a version's files again if they are no longer those that were published."""
+        folder = self.folder(publication)
+        if bundle_digest(folder) != publication.digest:
+            folder.rename(folder.parent.parent / f".damaged-{publication.version}-{uuid.uuid4().hex}")
+            self._copy_in(bundle, publication)
+
     @contextmanager
     def _locked(self, name: str) -> Iterator[None]:
         self._versions(name).mkdir(parents=True, exist_ok=True)
@@ -285,7 +293,10 @@ def _compare(score: float | None, champion: Publication | None, rival: float | N
     if champion is None:
         return True, "It is the first version with a score."
     if rival is None or not math.isfinite(rival):
-        return False, f"The champion {champion.version} could not be measured on these views, so it stays."
+        return False, (
+            f"The champion {champion.version} was trained on a scene of these views, or could not be measured on them: "
+            "it stays; `diaphane models promote` moves it by hand."
+        )
     verdict = "better than" if score < rival else "not better than"
     return score < rival, f"Score {score:.4g}, {verdict} {rival:.4g} of the champion {champion.version} on these views."
 

@@ -55,14 +55,17 @@ def compared(measurements: Iterable[Measurement]) -> list[Measurement]:
 
 
 def ratios(measurements: Iterable[Measurement], technique: str, baseline: str) -> list[float]:
-    """The mse of `technique` over that of `baseline`, for every scene, view and budget where both were measured."""
+    """The mse of `technique` over that of `baseline`, for every scene, view and budget where both were measured.
+
+    Pairs in which neither is above `MSE_FLOOR` are left out: both are lossless, and there is nothing to compare.
+    """
     table = {(m.scene, m.view, m.budget_factor, m.technique): m.mse or 0.0 for m in compared(measurements)}
     pairs = [
         (mse, table[scene, view, budget, baseline])
         for (scene, view, budget, name), mse in table.items()
         if name == technique and (scene, view, budget, baseline) in table
     ]
-    return [max(ours, MSE_FLOOR) / max(theirs, MSE_FLOOR) for ours, theirs in pairs]
+    return [max(ours, MSE_FLOOR) / max(theirs, MSE_FLOOR) for ours, theirs in pairs if max(ours, theirs) > MSE_FLOOR]
 
 
 def score(measurements: Iterable[Measurement]) -> float | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from schemas.bundle import load_manifest
 from schemas.measurement import Measurement, RegistryResult
 from services import summary
 from services.registry import Publication, Registry, bundle_digest
@@ -18,7 +19,8 @@ MeasureBundle = Callable[[Path, str], Sequence[Measurement]]
 def publish(work: Workspace, bundle: Path, views: Sequence[EvaluatedView], measure: MeasureBundle) -> RegistryResult:
     """Publish a bundle with its score on the held-out views.
 
-    A champion that was evaluated on other views is rendered on these, so that like is compared with like.
+    A champion that was evaluated on other views is rendered on these, so that like is compared with like; one that was
+    trained on a scene held out here cannot be compared, and stays.
 
     Args:
         work: The build.
@@ -35,12 +37,7 @@ def publish(work: Workspace, bundle: Path, views: Sequence[EvaluatedView], measu
     publication = registry.publish(name, bundle, score, _evaluation(work, held_out))
     if publication.digest in known:
         work.progress.skipped("bundles already published")
-    champion = registry.champion(name)
-    rival = None
-    if champion is not None and score is not None and _is_other(champion, publication):
-        folder = registry.folder(champion)
-        baseline = [m for m in measurements if m.technique != summary.BUNDLE]
-        rival = summary.score([*baseline, *measure(folder, bundle_digest(folder))])
+    rival = None if score is None else _rival(registry, publication, held_out, measure)
     promoted, reason = registry.consider(publication, score, rival)
     return RegistryResult(
         reference=f"{name}@{publication.version}",
@@ -51,8 +48,19 @@ def publish(work: Workspace, bundle: Path, views: Sequence[EvaluatedView], measu
     )
 
 
-def _is_other(champion: Publication, publication: Publication) -> bool:
-    return champion.version != publication.version
+def _rival(
+    registry: Registry, publication: Publication, held_out: Sequence[EvaluatedView], measure: MeasureBundle
+) -> float | None:
+    """The champion's score on the same views; None if there is no other champion, or it was trained on one of them."""
+    champion = registry.champion(publication.name)
+    if champion is None or champion.version == publication.version:
+        return None
+    folder = registry.folder(champion)
+    trained_on = set(load_manifest(folder).provenance.scenes.values())
+    if trained_on & {view.labelled.scene.digest for view in held_out}:
+        return None
+    baseline = [m for view in held_out for m in view.measurements if m.technique != summary.BUNDLE]
+    return summary.score([*baseline, *measure(folder, bundle_digest(folder))])
 
 
 def _evaluation(work: Workspace, held_out: Sequence[EvaluatedView]) -> dict[str, object]:

@@ -33,6 +33,7 @@ def inspect_scenes(work: Workspace) -> tuple[SceneEntry, ...]:
         for path in options.scenes:
             entries.append(_inspect(work, path))
             stage.advance(1, options.labels[path])
+    _refuse_copies(entries)
     return _transparent(work, entries)
 
 
@@ -74,6 +75,8 @@ def _facts(work: Workspace, path: Path) -> dict[str, object]:
     options = work.options
     scene = work.scene(path)
     views = views_from_file(options.views, path, scene) if options.views is not None else ()
+    if options.views is not None and not views:
+        work.progress.note(f"{options.views} has no views of {path}: its own cameras or sampled views are used.")
     views = views or scene_views(scene, options.views_per_scene, options.seed)
     return {
         "views": [view.model_dump(mode="json") for view in views],
@@ -81,6 +84,17 @@ def _facts(work: Workspace, path: Path) -> dict[str, object]:
         "opaque": scene.is_opaque,
         "warnings": list(scene.warnings),
     }
+
+
+def _refuse_copies(entries: list[SceneEntry]) -> None:
+    """The split is by asset: a copy of a training scene under another name would prove nothing."""
+    seen: dict[tuple[str, int], str] = {}
+    for entry in entries:
+        # The digest of a scene holds its file names; the root file and what comes of it do not depend on them.
+        content = file_sha256(entry.path), entry.triangles
+        if content in seen:
+            raise Problem(f"{seen[content]} and {entry.label} have the same content.", "Name each scene once.")
+        seen[content] = entry.label
 
 
 def _transparent(work: Workspace, entries: list[SceneEntry]) -> tuple[SceneEntry, ...]:

@@ -163,3 +163,21 @@ def test_opaque_scene_is_refused_with_the_way_out(tmp_path: Path) -> None:
     assert made.held_out == ()
     assert not made.registry.champion, "one scene proves nothing, so nothing is promoted"
     assert json.loads(Path(made.registry.folder, "manifest.json").read_text())["tail"]["name"] == "density"
+
+
+def test_a_copy_of_a_scene_is_refused_since_the_split_is_by_content(samples: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "other_name.usdc"
+    copy.write_bytes((samples / HELD_OUT).read_bytes())
+    wanted = options(samples, tmp_path, scenes=(HELD_OUT,), holdout=())
+    with pytest.raises(Problem, match="voxel_town and other_name have the same content"):
+        pipeline.build(
+            BuildOptions(scenes=(*wanted.scenes, copy), name="twins", holdout=(copy,), state=tmp_path), SilentProgress()
+        )
+
+
+def test_a_champion_trained_on_a_held_out_scene_is_not_compared_and_stays(
+    built: BuildResult, samples: Path, state: Path
+) -> None:
+    result = pipeline.build(options(samples, state, holdout=(samples / TRAIN[0],), steps=60), SilentProgress())
+    assert not result.registry.champion
+    assert "trained on" in result.registry.reason

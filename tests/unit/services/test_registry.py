@@ -103,7 +103,7 @@ def test_a_champion_that_cannot_be_measured_stays(registry: Registry, tmp_path: 
     publication = registry.publish("glass", make_bundle(tmp_path / "bundle", "b"), 0.1, EVALUATION)
     moved, reason = registry.consider(publication, 0.1, None)
     assert not moved
-    assert "1.0.0 could not be measured" in reason
+    assert "1.0.0 was trained on a scene of these views, or could not be measured" in reason
 
 
 def test_a_version_without_score_is_no_champion_even_if_it_is_the_first(registry: Registry, tmp_path: Path) -> None:
@@ -178,3 +178,13 @@ def test_damaged_aliases_are_named_with_the_way_out(registry: Registry, tmp_path
     with pytest.raises(Problem, match=r"aliases\.json.*models promote glass") as caught:
         registry.champion("glass")
     assert caught.value.code == ExitCode.CONFLICT
+
+
+def test_a_damaged_version_is_written_again_when_its_bundle_is_published_again(
+    registry: Registry, tmp_path: Path
+) -> None:
+    publish(registry, tmp_path, "a")
+    published = registry.resolve("glass@1.0.0")
+    (registry.folder(published) / "weights.safetensors").write_text("changed")
+    assert registry.publish("glass", tmp_path / "bundle-a", 0.5, EVALUATION).version == "1.0.0"
+    assert bundle_digest(registry.folder(published)) == published.digest

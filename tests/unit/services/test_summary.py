@@ -39,9 +39,11 @@ def test_exact_and_skipped_measurements_are_not_compared() -> None:
     assert summary.sentence(pairs).startswith("No view and budget could be compared")
 
 
-def test_errors_below_the_floor_count_as_the_floor() -> None:
-    pairs = [measurement("kbuffer-deep", 0.0), measurement("kbuffer-importance", 1e-12)]
-    assert summary.score(pairs) == 1.0
+def test_errors_below_the_floor_count_as_the_floor_and_two_of_them_as_nothing() -> None:
+    lossless = [measurement("kbuffer-deep", 0.0), measurement("kbuffer-importance", 1e-12)]
+    assert summary.score(lossless) is None
+    lossy = [measurement("kbuffer-deep", 0.0), measurement("kbuffer-importance", 4.0 * summary.MSE_FLOOR)]
+    assert summary.score(lossy) == pytest.approx(0.25)
 
 
 def test_the_sentence_counts_where_the_bundle_is_worse() -> None:
