@@ -5,11 +5,14 @@ An artifact's address is the sha256 of the canonical JSON of (stage, code versio
     root/<stage>/<key[:2]>/<key>/   files of the artifact and meta.json
     root/tmp/                       being written, or left by a crash; removed when a day old
     root/damaged/                   moved aside because a file did not match its sha256
+    root/verified/<stage>-<key>     sizes and times of the files when their sha256 last matched
 
 Rules:
 - an artifact is complete or absent: it is written under a temporary name, synced, then renamed;
 - of two writers of the same artifact the first wins and the second discards its copy;
-- a damaged artifact counts as missing, so the stage makes it again.
+- a damaged artifact counts as missing, so the stage makes it again;
+- files are hashed when their size or time of change is not what it was when they last matched: finding gigabytes of
+  artifacts again takes no reading of them.
 """
 
 from __future__ import annotations
@@ -97,15 +100,18 @@ class Store:
         return (self.path(address) / META).is_file()
 
     def get(self, address: Address) -> Path | None:
-        """The artifact's folder, its files verified (once a process); None if missing or damaged."""
+        """The artifact's folder, its files verified (see the rules above); None if missing or damaged."""
         folder = self.path(address)
         if not self.has(address):
             return None
         if address.key not in self._verified:
-            fault = _fault(folder, address)
-            if fault is not None:
-                self._set_aside(folder, address, fault)
-                return None
+            before = _signature(folder)
+            if before != self._remembered(address):
+                fault = _fault(folder, address)
+                if fault is not None:
+                    self._set_aside(folder, address, fault)
+                    return None
+                self._remember(address, before)
             self._verified.add(address.key)
         return folder
 
@@ -121,20 +127,33 @@ class Store:
             yield folder
             _write_meta(folder, address)
             sync_tree(folder)
-            self._commit(folder, self.path(address))
-            self._verified.add(address.key)
+            written = _signature(folder)
+            if self._commit(folder, self.path(address)):
+                self._remember(address, written)
+                self._verified.add(address.key)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
-    def _commit(self, folder: Path, target: Path) -> None:
+    def _commit(self, folder: Path, target: Path) -> bool:
+        """Whether this writer's artifact is the one that stays."""
         target.parent.mkdir(parents=True, exist_ok=True)
         try:
             folder.rename(target)
         except OSError:
             if not (target / META).is_file():
                 raise
-            return
+            return False
         sync(target.parent)
+        return True
+
+    def _remembered(self, address: Address) -> str | None:
+        path = self.root / "verified" / f"{address.stage}-{address.key}"
+        return path.read_text(encoding="utf-8") if path.is_file() else None
+
+    def _remember(self, address: Address, signature: str) -> None:
+        path = self.root / "verified" / f"{address.stage}-{address.key}"
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(signature, encoding="utf-8")  # a torn one does not match, and costs one more hashing
 
     def _set_aside(self, folder: Path, address: Address, fault: str) -> None:
         target = self.root / "damaged" / f"{address.stage}-{address.key}-{uuid.uuid4().hex[:8]}"
@@ -179,6 +198,12 @@ def write_durably(path: Path, text: str) -> None:
         os.fsync(stream.fileno())
     temporary.replace(path)
     sync(path.parent)
+
+
+def _signature(folder: Path) -> str:
+    """Names, sizes and times of change of all files, as one text."""
+    stats = ((path, path.stat()) for path in sorted(folder.rglob("*")) if path.is_file())
+    return canonical_json([[str(path.relative_to(folder)), stat.st_size, stat.st_mtime_ns] for path, stat in stats])
 
 
 def _write_meta(folder: Path, address: Address) -> None:

@@ -151,8 +151,9 @@ def test_a_damaged_artifact_is_moved_aside_and_counts_as_missing(
     assert Store(tmp_path).get(ADDRESS) is not None
 
 
-def test_files_are_hashed_once_a_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_touched_files_are_hashed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     put_text(Store(tmp_path), ADDRESS, "labels")
+    (Store(tmp_path).path(ADDRESS) / "data.txt").touch()
     hashed: list[Path] = []
 
     def spy(path: Path) -> str:
@@ -161,8 +162,9 @@ def test_files_are_hashed_once_a_process(tmp_path: Path, monkeypatch: pytest.Mon
 
     monkeypatch.setattr("services.store.file_sha256", spy)
     store = Store(tmp_path)
-    store.get(ADDRESS)
-    store.get(ADDRESS)
+    assert store.get(ADDRESS) is not None
+    assert store.get(ADDRESS) is not None
+    assert Store(tmp_path).get(ADDRESS) is not None
     assert [path.name for path in hashed] == ["data.txt"]
 
 
@@ -208,3 +210,16 @@ def test_write_durably_replaces_and_leaves_no_temporary_file(tmp_path: Path) -> 
     write_durably(path, "two")
     assert path.read_text() == "two"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_what_matched_before_and_has_not_changed_is_not_read_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    address = Address("render", "1", ("input",), {})
+    with Store(tmp_path).put(address) as folder:
+        (folder / "dump").write_bytes(b"fragments")
+    with monkeypatch.context() as patch:
+        patch.setattr("services.store.file_sha256", lambda _: pytest.fail("it was read again"))
+        assert Store(tmp_path).get(address) is not None
+    (Store(tmp_path).path(address) / "dump").write_bytes(b"fragmentz")
+    assert Store(tmp_path).get(address) is None
