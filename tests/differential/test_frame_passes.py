@@ -5,7 +5,7 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 import pytest
-from support.scenes import VIEW, shells
+from support.scenes import SIZE, VIEW, shells
 
 from renderer.capture import capture, row_bands
 from renderer.csr import offsets_of
@@ -13,18 +13,6 @@ from renderer.features import gather
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from schemas.fragments import FragmentDump
-
-SIZE = (160, 120)
-
-
-@pytest.fixture(scope="module")
-def frame(gl: moderngl.Context) -> Frame:
-    return Frame(GpuScene(gl, shells()), VIEW, *SIZE)
-
-
-@pytest.fixture(scope="module")
-def dump(frame: Frame) -> FragmentDump:
-    return capture(frame).dump
 
 
 def test_dump_is_sorted_by_depth_then_colour_inside_every_pixel(dump: FragmentDump) -> None:

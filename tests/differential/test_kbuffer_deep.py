@@ -5,33 +5,18 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 import pytest
-from support.scenes import VIEW, shells
 from support.training import random_weights
 
 from labeller.curves import composite
 from renderer.allocation.fill import feasible_k_min, solve_lambda
-from renderer.capture import capture
 from renderer.features import FEATURES, derive, gather
 from renderer.frame import Frame
-from renderer.gpu_scene import GpuScene
 from renderer.techniques import Budget, KBufferDeep
 from schemas.bundle import Provenance, TailSpec
 from schemas.colour import display8
 from schemas.fragments import FragmentDump
 from trainer.bundle import Description, export_bundle
 from trainer.weights import Weights
-
-SIZE = (200, 150)
-
-
-@pytest.fixture(scope="module")
-def frame(gl: moderngl.Context) -> Frame:
-    return Frame(GpuScene(gl, shells()), VIEW, *SIZE)
-
-
-@pytest.fixture(scope="module")
-def dump(frame: Frame) -> FragmentDump:
-    return capture(frame).dump
 
 
 @pytest.fixture(scope="module", params=[FEATURES, ("log_n", "optical_depth", "rgb_nearest_g", "depth_std")])

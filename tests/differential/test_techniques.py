@@ -5,28 +5,15 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 import pytest
-from support.scenes import VIEW, shells
+from support.scenes import SIZE, VIEW, shells
 
 from labeller.curves import composite
-from renderer.capture import capture
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.techniques import Budget, KBuffer, KBufferImportance, KBufferOptimal, SBuffer
 from schemas.colour import display8
 from schemas.fragments import FragmentDump
 from schemas.tail import TAILS, TailName
-
-SIZE = (160, 120)
-
-
-@pytest.fixture(scope="module")
-def frame(gl: moderngl.Context) -> Frame:
-    return Frame(GpuScene(gl, shells()), VIEW, *SIZE)
-
-
-@pytest.fixture(scope="module")
-def dump(frame: Frame) -> FragmentDump:
-    return capture(frame).dump
 
 
 def simulate(dump: FragmentDump, k: np.ndarray, tail: TailName, g: float = 0.75) -> np.ndarray:

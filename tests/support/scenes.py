@@ -9,6 +9,8 @@ from schemas.scene import Batch, SceneArrays, Texture
 from schemas.view import View
 
 VIEW = View(name="front", eye=(2.0, 1.5, 5.0), target=(0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), fov=45.0)
+SIZE = (160, 120)
+"""Pixels of the pictures that differential tests make of it."""
 
 
 class _Builder:
