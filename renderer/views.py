@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from renderer.rooms import Room, find_room
 from schemas.problem import ExitCode, Problem
 from schemas.scene import SceneArrays
-from schemas.view import Vec3, View
+from schemas.view import ListedView, Vec3, View
 
 Floats = NDArray[np.float64]
 
@@ -21,22 +22,11 @@ SAMPLED_POINTS = 4096
 """Vertices that stand for the geometry when views are sampled."""
 
 
-class _ListedView(BaseModel):
-    """A view of a views file, in stage units and stage axes."""
-
-    model_config = ConfigDict(extra="ignore")
-
-    eye: Vec3
-    target: Vec3
-    up: Vec3
-    fov: float = Field(gt=0.0, lt=180.0)
-
-
 class _ListedScene(BaseModel):
     model_config = ConfigDict(extra="ignore")
 
     main: str | None = None
-    views: tuple[_ListedView, ...] = ()
+    views: tuple[ListedView, ...] = ()
 
 
 class _ViewsFile(BaseModel):
@@ -45,14 +35,13 @@ class _ViewsFile(BaseModel):
     scenes: tuple[_ListedScene, ...]
 
 
-def views_from_file(path: Path, scene_path: Path, scene: SceneArrays) -> tuple[View, ...]:
-    """The views that a views file lists for a scene; empty if it lists none.
+def listed_views(path: Path, scene_path: Path) -> tuple[ListedView, ...]:
+    """The views that a views file lists for a scene; none if it lists none.
 
     Args:
         path: JSON `{"scenes": [{"main": FILE, "views": [{"eye", "target", "up", "fov"}]}]}`; FILE is relative to the
             JSON file, the numbers are in stage units and axes, fov is vertical, degrees.
         scene_path: The scene's root layer.
-        scene: The scene itself, for its origin and units.
 
     Raises:
         Problem: The file is missing or has not that form.
@@ -68,8 +57,16 @@ def views_from_file(path: Path, scene_path: Path, scene: SceneArrays) -> tuple[V
             ExitCode.USAGE,
         ) from error
     wanted = scene_path.resolve()
-    found = [v for s in listed.scenes if s.main and (path.parent / s.main).resolve() == wanted for v in s.views]
-    return tuple(_placed(f"view{i}", v, scene, path) for i, v in enumerate(found))
+    return tuple(v for s in listed.scenes if s.main and (path.parent / s.main).resolve() == wanted for v in s.views)
+
+
+def placed_views(listed: Sequence[ListedView], scene: SceneArrays) -> tuple[View, ...]:
+    """Listed views in metres, relative to the scene's origin.
+
+    Raises:
+        Problem: One of them has no direction.
+    """
+    return tuple(_placed(f"view{i}", view, scene) for i, view in enumerate(listed))
 
 
 def scene_views(scene: SceneArrays, count: int, seed: int) -> tuple[View, ...]:
@@ -157,14 +154,14 @@ def _view(name: str, eye: Floats, target: Floats, scene: SceneArrays, fov: float
     return View(name=name, eye=_vec3(eye), target=_vec3(target), up=scene.up, fov=fov)
 
 
-def _placed(name: str, listed: _ListedView, scene: SceneArrays, path: Path) -> View:
+def _placed(name: str, listed: ListedView, scene: SceneArrays) -> View:
     metres, origin = scene.metres_per_unit, scene.origin
     eye, target = (np.array(p) * metres - origin for p in (listed.eye, listed.target))
     view = View(name=name, eye=_vec3(eye), target=_vec3(target), up=listed.up, fov=listed.fov)
     try:
         view.world_to_view()
     except ValueError as error:
-        raise Problem(f"{name} of {scene.name} in {path} is no view: {error}.", "Correct that entry.") from error
+        raise Problem(f"{name} of {scene.name} is no view: {error}.", "Correct that view.") from error
     return view
 
 

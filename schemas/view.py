@@ -9,6 +9,24 @@ from pydantic import BaseModel, ConfigDict, Field
 Vec3 = tuple[float, float, float]
 
 
+class ListedView(BaseModel):
+    """A camera as people list them: stage units and axes.
+
+    Attributes:
+        eye: Position.
+        target: A point on the view axis.
+        up: Up direction, not parallel to the view axis.
+        fov: Vertical field of view, degrees.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
+
+    eye: Vec3
+    target: Vec3
+    up: Vec3
+    fov: float = Field(gt=0.0, lt=180.0)
+
+
 class View(BaseModel):
     """A camera. Right-handed, looks along -z of its own frame; depth is the distance along that axis.
 

@@ -14,7 +14,7 @@ from support.stages import stage, triangle
 
 from renderer.rooms import find_room
 from renderer.scene import load_scene
-from renderer.views import ASPECT, sampled_views, scene_views, views_from_file
+from renderer.views import ASPECT, listed_views, placed_views, sampled_views, scene_views
 from schemas.problem import ExitCode, Problem
 from schemas.scene import Batch, SceneArrays
 
@@ -95,10 +95,10 @@ def _listing(folder: Path, **view: object) -> Path:
 def test_listed_views_are_converted_to_metres_around_the_origin(tmp_path: Path) -> None:
     path = stage(tmp_path, triangle(), "metersPerUnit = 0.01")
     scene = load_scene(path)
-    (view,) = views_from_file(_listing(tmp_path), path, scene)
+    (view,) = placed_views(listed_views(_listing(tmp_path), path), scene)
     np.testing.assert_allclose(np.array(view.eye) + scene.origin, (0, 0, 1.0))
     assert view.fov == 50
-    assert views_from_file(_listing(tmp_path), tmp_path / "other.usda", scene) == ()
+    assert listed_views(_listing(tmp_path), tmp_path / "other.usda") == ()
 
 
 @pytest.mark.parametrize(
@@ -108,12 +108,13 @@ def test_a_views_file_of_another_form_is_a_problem(tmp_path: Path, text: str) ->
     file = tmp_path / "views.json"
     file.write_text(text, encoding="latin-1")
     with pytest.raises(Problem, match="not a views file"):
-        views_from_file(file, tmp_path / "scene.usda", shells())
+        listed_views(file, tmp_path / "scene.usda")
 
 
 def test_a_missing_views_file_and_a_view_without_direction_are_problems(tmp_path: Path) -> None:
     with pytest.raises(Problem, match="no views file") as caught:
-        views_from_file(tmp_path / "absent.json", tmp_path / "scene.usda", shells())
+        listed_views(tmp_path / "absent.json", tmp_path / "scene.usda")
     assert caught.value.code == ExitCode.NOT_FOUND
+    listed = listed_views(_listing(tmp_path, target=[0, 0, 100]), tmp_path / "scene.usda")
     with pytest.raises(Problem, match="no view"):
-        views_from_file(_listing(tmp_path, target=[0, 0, 100]), tmp_path / "scene.usda", shells())
+        placed_views(listed, shells())

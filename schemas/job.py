@@ -1,0 +1,114 @@
+"""What can be asked of the service: kinds of jobs, their parameters, and the states they go through."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
+
+from schemas.limits import LIMITS
+from schemas.tail import DENSITY_G, TailName
+from schemas.view import ListedView
+
+JobKind = Literal["build", "render", "label", "train", "evaluate"]
+"""`render` ends with fragment dumps, `label` with a data set, `train` with a version without a score, `evaluate` with
+measurements of a version; `build` is all of them, and promotes what is better."""
+
+JobState = Literal["queued", "running", "cancelling", "cancelled", "succeeded", "failed"]
+FINAL_STATES: tuple[JobState, ...] = ("cancelled", "succeeded", "failed")
+
+TaskState = Literal["queued", "running", "done", "skipped", "quarantined", "cancelled"]
+"""`skipped`: the artifact was there already; `quarantined`: it failed to the end, and the job went on without it."""
+
+Priority = Literal["low", "normal", "high"]
+
+ModelName = Annotated[str, StringConstraints(pattern=r"^[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?$")]
+ModelReference = Annotated[
+    str, StringConstraints(pattern=r"^[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?(?:@[A-Za-z0-9.-]{1,40})?$")
+]
+SceneId = Annotated[str, StringConstraints(pattern=r"^scn_[0-9a-f]{32}$")]
+DatasetId = Annotated[str, StringConstraints(pattern=r"^dst_[0-9a-f]{32}$")]
+
+_STRICT = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class SceneUse(BaseModel):
+    """A scene of a job.
+
+    Attributes:
+        scene: Its id.
+        holdout: Whether it is evaluated on and never trained on.
+        views: Cameras in stage units and axes; empty: the stage's own, else sampled ones.
+    """
+
+    model_config = _STRICT
+
+    scene: SceneId
+    holdout: bool = False
+    views: tuple[ListedView, ...] = Field(default=(), max_length=LIMITS.views)
+
+
+class JobSpec(BaseModel):
+    """A job as submitted.
+
+    Attributes:
+        kind: What it makes.
+        name: Bundle that a `build` or `train` publishes a version of.
+        scenes: What it is made from; empty where a `train` names a data set.
+        dataset: Data set that a `train` learns from, instead of scenes.
+        model: Version that an `evaluate` measures, `name`, `name@alias` or `name@1.2.0`.
+        budgets: Fragments of a frame as multiples of width * height.
+        alpha: Opacity in (0, 1) that every surface gets; None keeps the materials' own.
+        views_per_scene: How many views are sampled of a scene without cameras of its own.
+        width: Pixels per row.
+        height: Rows.
+        tail: How the fragments beyond k are averaged.
+        g: Steepness of the density tail.
+        seed: Seed of everything drawn at random.
+        steps: Optimiser steps; None: the trainer's default.
+        start_from: Weights that the training begins with: drawn by the seed, or those of the name's champion.
+        promote: Whether a better version becomes the champion, or stays a candidate.
+        priority: Class of the job's tasks in the queues; within a class, jobs share fairly.
+    """
+
+    model_config = _STRICT
+
+    kind: JobKind
+    name: ModelName | None = None
+    scenes: tuple[SceneUse, ...] = Field(default=(), max_length=LIMITS.scenes)
+    dataset: DatasetId | None = None
+    model: ModelReference | None = None
+    budgets: tuple[Annotated[float, Field(gt=0.0, le=LIMITS.budget)], ...] = Field(
+        default=(1.0, 2.0, 4.0), min_length=1, max_length=LIMITS.budgets
+    )
+    alpha: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
+    views_per_scene: int = Field(default=3, ge=1, le=LIMITS.views)
+    width: int = Field(default=1430, ge=LIMITS.min_side, le=LIMITS.max_side)
+    height: int = Field(default=960, ge=LIMITS.min_side, le=LIMITS.max_side)
+    tail: TailName = "density"
+    g: float = Field(default=DENSITY_G, ge=0.0, le=10.0)
+    seed: int = Field(default=0, ge=0, le=2**31 - 1)
+    steps: Annotated[int, Field(ge=1, le=LIMITS.steps)] | None = None
+    start_from: Literal["scratch", "champion"] = "scratch"
+    promote: Literal["if-better", "never"] = "if-better"
+    priority: Priority = "normal"
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        if self.kind in ("build", "train") and self.name is None:
+            raise ValueError(f"a {self.kind} needs a name")
+        if self.kind == "evaluate" and self.model is None:
+            raise ValueError("an evaluate needs a model")
+        if self.dataset is not None and (self.kind != "train" or self.scenes):
+            raise ValueError("a data set is for a train without scenes")
+        if self.dataset is None and not self.scenes:
+            raise ValueError(f"a {self.kind} needs at least one scene")
+        if len({use.scene for use in self.scenes}) != len(self.scenes):
+            raise ValueError("a scene is listed twice")
+        if self.kind in ("build", "train") and self.scenes and all(use.holdout for use in self.scenes):
+            raise ValueError("every scene is held out, so there is none to train on")
+        if self.width * self.height > LIMITS.pixels:
+            raise ValueError(f"{self.width} x {self.height} is more than {LIMITS.pixels} pixels")
+        if min(self.budgets) * self.width * self.height < 1.0:
+            raise ValueError("a budget is less than one fragment")
+        return self
