@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import moderngl
 import pytest
 from hypothesis import settings
+from support.postgres import Postgres
+from support.s3 import S3Server, environment
 
 from renderer.context import gl_context
+from services.settings import Settings
+from services.storage import Storage, open_storage
+
+Machine = Callable[[str], Storage]
+"""Opens one storage as a machine of the given name does."""
 
 # Failing examples are printed as code, so the same examples everywhere cost nothing; a shared machine has no deadline.
 settings.register_profile("diaphane", deadline=None, max_examples=50, derandomize=True, database=None)
@@ -32,3 +40,42 @@ def ctx(gl: moderngl.Context) -> Iterator[moderngl.Context]:
     _ = gl.error
     yield gl
     assert gl.error == "GL_NO_ERROR"
+
+
+@pytest.fixture(scope="session")
+def postgres(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Postgres]:
+    """The test session's PostgreSQL server."""
+    server = Postgres(tmp_path_factory.mktemp("postgres") / "server")
+    yield server
+    server.stop("immediate")
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """URL of an empty database: every test that asks for it runs on both kinds."""
+    if request.param == "sqlite":
+        return f"sqlite:///{tmp_path / 'test.sqlite'}"
+    server: Postgres = request.getfixturevalue("postgres")
+    return server.new_database()
+
+
+@pytest.fixture(scope="session")
+def s3() -> Iterator[S3Server]:
+    """The test session's S3 server; processes that the tests start find it in their environment."""
+    server = S3Server()
+    with environment(server.environment):
+        yield server
+    server.stop()
+
+
+@pytest.fixture
+def s3_url(s3: S3Server) -> str:
+    """Store URL of an empty bucket."""
+    return f"s3://{s3.new_bucket()}/some/prefix"
+
+
+@pytest.fixture(params=["folder", "s3"])
+def machine(request: pytest.FixtureRequest, tmp_path: Path) -> Machine:
+    """Opens one storage as a machine of the given name does: every test that asks for it runs on both kinds."""
+    shared = str(tmp_path / "store") if request.param == "folder" else request.getfixturevalue("s3_url")
+    return lambda name: open_storage(Settings(state=tmp_path / name, store=shared))

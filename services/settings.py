@@ -1,0 +1,74 @@
+"""Configuration of the service: the only difference between a laptop and a cluster is these values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import Field
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+
+class Settings(BaseSettings):
+    """Read from the environment, `DIAPHANE_` and the name in capitals.
+
+    Attributes:
+        state: Folder of everything that is not in a shared database or store.
+        database: SQLAlchemy-style URL, `sqlite:///PATH` or `postgresql://...`; empty: SQLite in `state`. A secret:
+            whoever can write to the database can run code on the workers.
+        store: Folder, or `s3://bucket/prefix` (credentials and endpoint as usual in `AWS_*`); empty: `state`/store.
+        cache: Local copies of what lies in an object store; empty: `state`/cache.
+        signing_key: ed25519 seed, base64, that versions are signed with; empty: made once and kept in `state`.
+        heartbeat: Seconds between two heartbeats of a process.
+        ttl: Seconds of silence after which a process is taken for dead.
+        poll: Seconds between two looks into a queue.
+        slots_render: Child processes of a worker for the role `render`.
+        slots_label: The same for `label`.
+        slots_train: The same for `train`.
+        task_seconds: Longest time of a task other than a training.
+        train_seconds: Longest time of a training.
+        task_bytes: Memory that a task's process may use; 0: no bound.
+        drain_seconds: How long a worker that is told to stop waits for tasks under way.
+        keep_days: Artifacts, jobs and events unused for longer are removed; 0: kept.
+        keep_bytes: Beyond this the least recently used artifacts are removed; 0: no bound.
+        hosts: Names, separated by commas, that the API answers for beside those of the loopback interface; `*`: any.
+        rate: Requests a second that a key may make, on average.
+        burst: Requests that it may make at once.
+    """
+
+    model_config = SettingsConfigDict(env_prefix="DIAPHANE_", frozen=True, extra="ignore")
+
+    state: Path = Path(".diaphane")
+    database: str = Field(default="", repr=False)
+    store: str = ""
+    cache: str = ""
+    signing_key: str = Field(default="", repr=False)
+    heartbeat: float = Field(default=1.0, gt=0.0)
+    ttl: float = Field(default=10.0, gt=0.0)
+    poll: float = Field(default=0.2, gt=0.0)
+    slots_render: int = Field(default=1, ge=1)
+    slots_label: int = Field(default=1, ge=1)
+    slots_train: int = Field(default=1, ge=1)
+    task_seconds: float = Field(default=1800.0, gt=0.0)
+    train_seconds: float = Field(default=7 * 86400.0, gt=0.0)
+    task_bytes: int = Field(default=0, ge=0)
+    drain_seconds: float = Field(default=20.0, ge=0.0)
+    keep_days: float = Field(default=30.0, ge=0.0)
+    keep_bytes: int = Field(default=0, ge=0)
+    hosts: str = ""
+    rate: float = Field(default=50.0, gt=0.0)
+    burst: int = Field(default=200, ge=1)
+
+    @property
+    def database_url(self) -> str:
+        """`database`, or SQLite in the state folder."""
+        return self.database or f"sqlite:///{self.state.resolve() / 'diaphane.sqlite'}"
+
+    @property
+    def store_url(self) -> str:
+        """`store`, or a folder in the state folder."""
+        return self.store or str(self.state.resolve() / "store")
+
+    @property
+    def cache_folder(self) -> Path:
+        """Where local copies of an object store's content lie."""
+        return Path(self.cache) if self.cache else self.state.resolve() / "cache"

@@ -1,0 +1,70 @@
+from __future__ import annotations
+
+import threading
+
+import pytest
+import sqlalchemy as sa
+
+from schemas.problem import Problem
+from services.database import Database, open_database, tables
+
+
+def _count(database: Database) -> int:
+    with database.read() as connection:
+        return int(connection.scalar(sa.select(sa.func.count()).select_from(tables.aliases)) or 0)
+
+
+def _write_and_fail(database: Database) -> None:
+    with database.write() as connection:
+        connection.execute(tables.aliases.insert().values(name="a", alias="champion", version="1.0.0"))
+        raise KeyError
+
+
+def test_a_transaction_is_kept_whole_or_not_at_all(database_url: str) -> None:
+    database = open_database(database_url)
+    with pytest.raises(KeyError):
+        _write_and_fail(database)
+    assert _count(database) == 0
+    with database.write() as connection:
+        connection.execute(tables.aliases.insert().values(name="a", alias="champion", version="1.0.0"))
+    assert _count(database) == 1
+
+
+def test_opening_again_changes_nothing_and_other_tables_are_refused(database_url: str) -> None:
+    database = open_database(database_url)
+    open_database(database_url).close()
+    with database.write() as connection:
+        connection.execute(tables.meta.update().values(value="0"))
+    with pytest.raises(Problem, match="tables of version 0"):
+        open_database(database_url)
+
+
+def test_writers_wait_for_each_other(database_url: str) -> None:
+    database = open_database(database_url)
+    with database.write() as connection:
+        connection.execute(tables.meta.insert().values(name="count", value="0"))
+
+    def add() -> None:
+        for _ in range(25):
+
+            def body(connection: sa.Connection) -> None:
+                locked = sa.select(tables.meta.c.value).where(tables.meta.c.name == "count").with_for_update()
+                value = int(connection.scalar(locked) or 0)
+                connection.execute(
+                    tables.meta.update().where(tables.meta.c.name == "count").values(value=str(value + 1))
+                )
+
+            database.retry(body)
+
+    threads = [threading.Thread(target=add) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    with database.read() as connection:
+        assert connection.scalar(sa.select(tables.meta.c.value).where(tables.meta.c.name == "count")) == "100"
+
+
+def test_an_unknown_scheme_says_what_to_set() -> None:
+    with pytest.raises(Problem, match="DIAPHANE_DATABASE"):
+        Database("mysql://somewhere/else")
