@@ -2,12 +2,12 @@
 
 An artifact's address is the sha256 of the canonical JSON of (stage, code version, inputs' keys, parameters). Layout:
 
-    root/<stage>/<key[:2]>/<key>/   files of the artifact and meta.json
+    root/<stage>/<key[:2]>/<key>/   files of the artifact and meta.json; the folder's own time is that of its last use
     root/tmp/                       being written, or left by a crash; removed when a day old
     root/damaged/                   moved aside because a file did not match its sha256
     root/verified/<stage>-<key>     sizes and times of the files when their sha256 last matched
 
-Rules:
+`services.storage` puts an object store behind it, for workers on several machines. Rules:
 - an artifact is complete or absent: it is written under a temporary name, synced, then renamed;
 - of two writers of the same artifact the first wins and the second discards its copy;
 - a damaged artifact counts as missing, so the stage makes it again;
@@ -21,11 +21,12 @@ import hashlib
 import json
 import logging
 import os
+import re
 import shutil
 import time
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cached_property
@@ -34,6 +35,11 @@ from typing import Any
 
 META = "meta.json"
 STALE_SECONDS = 24 * 3600.0
+DAMAGED_SECONDS = 7 * STALE_SECONDS
+TOUCH_SECONDS = 600.0
+"""A use is not written down when another one was, less than this long ago."""
+
+_ARTIFACT = re.compile(r"[a-z][a-z0-9-]{0,31}/[0-9a-f]{64}")
 
 log = logging.getLogger(__name__)
 
@@ -76,6 +82,38 @@ class Address:
         parts = [self.stage, self.version, list(self.inputs), dict(self.params)]
         return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
 
+    @property
+    def artifact(self) -> str:
+        """`stage/key`, the artifact's name outside this process."""
+        return f"{self.stage}/{self.key}"
+
+
+class MissingArtifact(Exception):
+    """An artifact is absent or was damaged, so that it has to be made again.
+
+    Args:
+        artifact: `stage/key`.
+    """
+
+    def __init__(self, artifact: str) -> None:
+        super().__init__(artifact)
+        self.artifact = artifact
+
+
+@dataclass(frozen=True)
+class StoredArtifact:
+    """An artifact as retention sees it.
+
+    Attributes:
+        artifact: `stage/key`.
+        bytes: Of its files.
+        last_used: Seconds since 1970 UTC.
+    """
+
+    artifact: str
+    bytes: int
+    last_used: float
+
 
 class Store:
     """Artifacts under one folder. Any number of processes may share it.
@@ -87,33 +125,123 @@ class Store:
     def __init__(self, root: Path) -> None:
         self.root = root
         self._temporary = root / "tmp"
-        self._verified: set[str] = set()
         self._temporary.mkdir(parents=True, exist_ok=True)
-        self._remove_stale()
+        self._clear_temporary(time.time())
 
     def path(self, address: Address) -> Path:
         """Where the artifact is, or would be."""
-        return self.root / address.stage / address.key[:2] / address.key
+        return self._folder(address.artifact)
 
     def has(self, address: Address) -> bool:
         """Whether the artifact is there, without reading its files: for deciding that a stage can be skipped."""
-        return (self.path(address) / META).is_file()
+        return self.holds(address.artifact)
 
     def get(self, address: Address) -> Path | None:
         """The artifact's folder, its files verified (see the rules above); None if missing or damaged."""
-        folder = self.path(address)
-        if not self.has(address):
+        try:
+            return self.fetch(address.artifact)
+        except MissingArtifact:
             return None
-        if address.key not in self._verified:
+
+    def fetch(self, artifact: str) -> Path:
+        """The local folder of an artifact, its files verified.
+
+        Args:
+            artifact: `stage/key`.
+
+        Raises:
+            MissingArtifact: It is absent, or was damaged and has been moved aside.
+        """
+        folder = self._folder(artifact)
+        if not (folder / META).is_file():
+            raise MissingArtifact(artifact)
+        try:
             before = _signature(folder)
-            if before != self._remembered(address):
-                fault = _fault(folder, address)
-                if fault is not None:
-                    self._set_aside(folder, address, fault)
-                    return None
-                self._remember(address, before)
-            self._verified.add(address.key)
+        except FileNotFoundError:  # removed meanwhile
+            raise MissingArtifact(artifact) from None
+        if before != self._remembered(artifact):
+            fault = _fault(folder, artifact)
+            if fault is not None:
+                self._set_aside(artifact, fault)
+                raise MissingArtifact(artifact)
+            self._remember(artifact, before)
+        _touch(folder)
         return folder
+
+    def holds(self, artifact: str) -> bool:
+        """Whether the artifact `stage/key` is there, without reading its files; counts as a use of it."""
+        folder = self._folder(artifact)
+        if not (folder / META).is_file():
+            return False
+        _touch(folder)
+        return True
+
+    def read(self, artifact: str, name: str) -> bytes:
+        """The verified content of one small file of the artifact `stage/key`.
+
+        Raises:
+            MissingArtifact: The artifact is absent, or was damaged and has been moved aside.
+            FileNotFoundError: The artifact has no file of that name.
+        """
+        folder = self._folder(artifact)
+        if not (folder / META).is_file():
+            raise MissingArtifact(artifact)
+        try:
+            expected = read_meta(folder, artifact)["files"].get(name)
+            content = b"" if expected is None else (folder / name).read_bytes()
+            if expected is not None and hashlib.sha256(content).hexdigest() != expected["sha256"]:
+                raise ValueError(f"{name} does not match its sha256")
+        except _DAMAGE as error:
+            self._set_aside(artifact, f"{type(error).__name__}: {error}")
+            raise MissingArtifact(artifact) from error
+        if expected is None:
+            raise FileNotFoundError(f"The artifact {artifact} has no file {name}.")
+        _touch(folder)
+        return content
+
+    def push(self, address: Address) -> None:
+        """Makes a local artifact known to the other machines: nothing to do where all share this folder."""
+
+    def remove(self, artifact: str) -> None:
+        """Removes the artifact `stage/key`, in one step for its readers; does nothing if it is absent."""
+        grave = self._temporary / f"removed-{uuid.uuid4().hex}"
+        try:
+            self._folder(artifact).rename(grave)
+        except FileNotFoundError:
+            return
+        self._memory(artifact).unlink(missing_ok=True)
+        shutil.rmtree(grave, ignore_errors=True)
+
+    def artifacts(self) -> Iterator[StoredArtifact]:
+        """All artifacts."""
+        for meta in self.root.glob(f"*/??/*/{META}"):
+            folder = meta.parent
+            artifact = f"{folder.parent.parent.name}/{folder.name}"
+            if not _ARTIFACT.fullmatch(artifact):
+                continue
+            try:
+                yield StoredArtifact(artifact, _total_bytes(folder), folder.stat().st_mtime)
+            except FileNotFoundError:
+                continue  # removed meanwhile
+
+    def cached(self) -> Iterator[StoredArtifact]:
+        """Local copies of artifacts that lie in an object store: none here."""
+        return iter(())
+
+    def drop(self, artifact: str) -> None:
+        """Removes the local copy of an artifact that lies in an object store."""
+
+    def clean(self, now: float) -> None:
+        """Removes what crashes left more than a day ago, and what was moved aside more than a week ago.
+
+        Args:
+            now: Seconds since 1970 UTC.
+        """
+        self._clear_temporary(now)
+        for entry in (self.root / "damaged").glob("*"):
+            with suppress(FileNotFoundError):  # another process was first
+                if now - entry.stat().st_ctime > DAMAGED_SECONDS:
+                    remove_tree(entry)
 
     @contextmanager
     def put(self, address: Address) -> Iterator[Path]:
@@ -126,37 +254,58 @@ class Store:
         try:
             yield folder
             _write_meta(folder, address)
-            sync_tree(folder)
-            written = _signature(folder)
-            if self._commit(folder, self.path(address)):
-                self._remember(address, written)
-                self._verified.add(address.key)
+            self._keep(folder, address.artifact)
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
-    def _commit(self, folder: Path, target: Path) -> bool:
-        """Whether this writer's artifact is the one that stays."""
+    def _clear_temporary(self, now: float) -> None:
+        for entry in self._temporary.iterdir():
+            try:
+                age = now - max(path.stat().st_mtime for path in (entry, *entry.rglob("*")))
+            except FileNotFoundError:
+                continue  # its owner has just committed it
+            if age > STALE_SECONDS:
+                remove_tree(entry)
+
+    def _keep(self, folder: Path, artifact: str) -> None:
+        """Moves a complete temporary folder to where its artifact belongs, unless another one is there already."""
+        sync_tree(folder)
+        written = _signature(folder)
+        target = self._folder(artifact)
         target.parent.mkdir(parents=True, exist_ok=True)
         try:
             folder.rename(target)
         except OSError:
             if not (target / META).is_file():
                 raise
-            return False
+            return
         sync(target.parent)
-        return True
+        self._remember(artifact, written)
 
-    def _remembered(self, address: Address) -> str | None:
-        path = self.root / "verified" / f"{address.stage}-{address.key}"
-        return path.read_text(encoding="utf-8") if path.is_file() else None
+    def _folder(self, artifact: str) -> Path:
+        if not _ARTIFACT.fullmatch(artifact):
+            raise ValueError(f"'{artifact}' does not name an artifact: it is STAGE/KEY.")
+        stage, _, key = artifact.partition("/")
+        return self.root / stage / key[:2] / key
 
-    def _remember(self, address: Address, signature: str) -> None:
-        path = self.root / "verified" / f"{address.stage}-{address.key}"
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(signature, encoding="utf-8")  # a torn one does not match, and costs one more hashing
+    def _memory(self, artifact: str) -> Path:
+        return self.root / "verified" / artifact.replace("/", "-")
 
-    def _set_aside(self, folder: Path, address: Address, fault: str) -> None:
-        target = self.root / "damaged" / f"{address.stage}-{address.key}-{uuid.uuid4().hex[:8]}"
+    def _remembered(self, artifact: str) -> str | None:
+        try:
+            return self._memory(artifact).read_text(encoding="utf-8")
+        except FileNotFoundError:
+            return None
+
+    def _remember(self, artifact: str, signature: str) -> None:
+        path = self._memory(artifact)
+        with suppress(OSError):  # a torn or missing one does not match, and costs one more hashing
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(signature, encoding="utf-8")
+
+    def _set_aside(self, artifact: str, fault: str) -> None:
+        folder = self._folder(artifact)
+        target = self.root / "damaged" / f"{artifact.replace('/', '-')}-{uuid.uuid4().hex[:8]}"
         target.parent.mkdir(exist_ok=True)
         log.warning("The artifact %s is damaged (%s): moved to %s, and made again.", folder, fault, target)
         try:
@@ -164,14 +313,13 @@ class Store:
         except FileNotFoundError:
             return  # another process was first to move it
 
-    def _remove_stale(self) -> None:
-        for folder in self._temporary.iterdir():
-            try:
-                age = time.time() - max(path.stat().st_mtime for path in (folder, *folder.rglob("*")))
-            except FileNotFoundError:
-                continue  # its owner has just committed it
-            if age > STALE_SECONDS:
-                shutil.rmtree(folder, ignore_errors=True)
+
+def remove_tree(path: Path) -> None:
+    """Removes a file, or a folder with all that is in it, as far as that can be done."""
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def sync(path: Path) -> None:
@@ -223,16 +371,58 @@ def _write_meta(folder: Path, address: Address) -> None:
     (folder / META).write_text(json.dumps(meta, indent=2, sort_keys=True, allow_nan=False), encoding="utf-8")
 
 
-def _fault(folder: Path, address: Address) -> str | None:
+_DAMAGE = (OSError, ValueError, KeyError, TypeError, AttributeError)
+"""What reading an artifact raises whose files or meta.json are not as they were written."""
+
+
+def read_meta(folder: Path, artifact: str) -> dict[str, Any]:
+    """`meta.json` of an artifact's folder.
+
+    Raises:
+        OSError: It cannot be read.
+        ValueError: It is not the meta.json of that artifact.
+    """
+    return parse_meta((folder / META).read_bytes(), artifact)
+
+
+def parse_meta(content: bytes, artifact: str) -> dict[str, Any]:
+    """The content of a `meta.json`.
+
+    Raises:
+        ValueError: It is not the meta.json of that artifact.
+    """
     try:
-        meta = json.loads((folder / META).read_text(encoding="utf-8"))
+        meta: dict[str, Any] = json.loads(content)
         made_from = Address(meta["stage"], meta["version"], meta["inputs"], meta["params"])
-        if made_from.key != address.key:
-            return f"{META} belongs to another artifact"
-        for name, expected in meta["files"].items():
+        named = made_from.artifact == artifact and isinstance(meta["files"], dict)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise ValueError(f"{META} is not valid ({type(error).__name__}: {error})") from error
+    if not named:
+        raise ValueError(f"{META} belongs to another artifact")
+    return meta
+
+
+def _fault(folder: Path, artifact: str) -> str | None:
+    try:
+        for name, expected in read_meta(folder, artifact)["files"].items():
             path = folder / name
             if path.stat().st_size != expected["bytes"] or file_sha256(path) != expected["sha256"]:
                 return f"{name} does not match its sha256"
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except _DAMAGE as error:
         return f"{type(error).__name__}: {error}"
     return None
+
+
+def _touch(folder: Path) -> None:
+    """Writes down a use: the time of the folder, which changes neither its files nor what is remembered of them."""
+    with suppress(OSError):  # a store that can only be read is used all the same
+        if time.time() - folder.stat().st_mtime > TOUCH_SECONDS:
+            os.utime(folder)
+
+
+def _total_bytes(folder: Path) -> int:
+    content = (folder / META).read_bytes()
+    try:
+        return len(content) + sum(int(entry["bytes"]) for entry in json.loads(content)["files"].values())
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return len(content)
