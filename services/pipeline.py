@@ -1,177 +1,337 @@
-"""The main job: the only place that knows the order of the stages."""
+"""The only place that knows the order of the stages: of the main job, and of the parts of it that can be asked for."""
 
 from __future__ import annotations
 
-import shlex
-import time
-from collections.abc import Iterator, Sequence
-from datetime import UTC, datetime
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
-import numpy as np
-
-from renderer.context import describe, gl_context
-from schemas.measurement import Measurement, ReportData, SceneSummary
+from schemas.bundle import load_manifest
+from schemas.job import JobSpec
+from schemas.measurement import Measurement, RegistryResult, SceneSummary
 from schemas.problem import ExitCode, Problem
-from services import summary
-from services.options import BuildOptions
-from services.progress import Progress
-from services.registry import bundle_digest
-from services.report import Picture, PictureSet, write_report
-from services.result import BuildResult
-from services.stages.evaluate import EvaluatedView, evaluate_views
-from services.stages.label import LabelledView, label_views
-from services.stages.learn import Bundle, learn
-from services.stages.pictures import EXACT, read_png, stem
-from services.stages.publish import publish
-from services.stages.render import render_views
-from services.stages.scenes import inspect_scenes
-from services.stages.workspace import SceneEntry, Workspace
-from services.store import Store
-from services.versions import library_versions, machine
-
-SHOWN_VIEWS = 2
-"""Views of each held-out scene whose pictures go into the report: more would make the file unwieldy."""
+from schemas.service import SceneRecord, ShardRef
+from services import steps, summary
+from services.plan import Plan, plan_of_job, source_of_version
+from services.records import Bundle, EvaluatedView, LabelledView, RenderedView, SceneEntry
+from services.registry import Publication
+from services.stages import tasks
+from services.stages.desk import BUNDLE, PAGE
+from services.tasks import Runner, Source, Task
 
 
-def build(options: BuildOptions, progress: Progress) -> BuildResult:
-    """From USD scenes to a published bundle and a report. What exists already is not made again.
+@dataclass(frozen=True, slots=True)
+class Built:
+    """What the main job found and made.
 
-    Args:
-        options: What to build.
-        progress: Where progress goes.
+    Attributes:
+        plan: What was asked for.
+        scenes: All scenes.
+        views: All labelled views.
+        bundle: The exported bundle.
+        evaluated: The views that it was measured on: of held-out scenes, or of all if none is held out.
+        registered: What became of the bundle.
+        rival_score: The champion's score on the same held-out views, if it could be compared.
+        rival: The champion's measurements on them.
+    """
+
+    plan: Plan
+    scenes: tuple[SceneEntry, ...]
+    views: tuple[LabelledView, ...]
+    bundle: Bundle
+    evaluated: tuple[EvaluatedView, ...]
+    registered: RegistryResult
+    rival_score: float | None
+    rival: tuple[Measurement, ...]
+
+
+def build(plan: Plan, runner: Runner) -> Built:
+    """From scenes to a published bundle. What exists already is not made again.
 
     Raises:
         Problem: Bad input, no GL driver, or a check that does not hold.
     """
-    started = time.monotonic()
-    work = Workspace(options, Store(options.state / "store"), progress)
-    scenes = inspect_scenes(work)
-    views = label_views(work, render_views(work, scenes))
-    _require_views(scenes, views)
-    _note_exact_budgets(work, views)
-    bundle = learn(work, scenes, views)
+    scenes = steps.read_scenes(plan, runner)
+    views = steps.label_views(plan, runner, steps.render_views(plan, runner, scenes))
+    champion = runner.registry.champion(plan.name)
+    bundle = _learn(plan, runner, scenes, views, champion)
     judged = [view for view in views if view.scene.held_out] or list(views)
-    evaluated = evaluate_views(work, judged, bundle.folder, bundle_digest(bundle.folder))
+    evaluated = steps.evaluate_views(plan, runner, judged, bundle.source, bundle.task)
+    held_out = [view for view in evaluated if view.labelled.scene.held_out]
+    rival = _rival(plan, runner, held_out, champion, bundle)
+    registered, rival_score = _publish(plan, runner, bundle, held_out, rival)
+    _record(runner, evaluated, registered.reference)
+    return Built(plan, scenes, views, bundle, evaluated, registered, rival_score, rival)
 
-    def measure(folder: Path, digest: str) -> list[Measurement]:
-        return [m for view in evaluate_views(work, judged, folder, digest, ("bundle",)) for m in view.measurements]
 
-    registered = publish(work, bundle.folder, evaluated, measure)
-    data = ReportData(
-        name=options.name,
-        command=command_line(options),
-        created=datetime.now(UTC).isoformat(timespec="seconds"),
-        scenes=tuple(_scene_summary(scene, views) for scene in scenes),
-        measurements=tuple(m for view in evaluated for m in view.measurements),
-        certificates=tuple(c for view in judged for c in view.certificates),
-        training=bundle.history,
-        registry=registered,
-        skipped=dict(progress.skips),
-        machine={**machine(), "GL": describe(gl_context())} if work.worked else machine(),
-        versions=library_versions(),
-        provenance=_provenance(options, scenes, bundle),
+def report_data(built: Built, command: str, created: str, skipped: Mapping[str, int]) -> dict[str, Any]:
+    """What the report shows, JSON, apart from what its stage finds out itself (see `services.stages.report.write`)."""
+    judged = [view.labelled for view in built.evaluated]
+    scenes = [_scene_summary(scene, [view.rendered for view in built.views]) for scene in built.scenes]
+    return {
+        "name": built.plan.name,
+        "command": command,
+        "created": created,
+        "scenes": [scene.model_dump(mode="json") for scene in scenes],
+        "certificates": [c.model_dump(mode="json") for view in judged for c in view.certificates],
+        "training": [point.model_dump(mode="json") for point in built.bundle.history],
+        "registry": built.registered.model_dump(mode="json"),
+        "skipped": dict(skipped),
+        "provenance": {
+            "seed": built.plan.seed,
+            "tail": built.plan.tail,
+            "g": built.plan.g,
+            "alpha": built.plan.alpha,
+            "bundle": built.bundle.digest,
+            "scenes": {scene.label: scene.digest for scene in built.scenes},
+        },
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class JobContext:
+    """The job that a run belongs to: its id, and when it was submitted (ISO 8601, UTC)."""
+
+    id: str
+    created: str
+
+
+def run_job(spec: JobSpec, scenes: Mapping[str, SceneRecord], runner: Runner, job: JobContext) -> dict[str, Any]:
+    """A job of the service.
+
+    Args:
+        spec: The job as submitted.
+        scenes: Records of its scenes, by id.
+        runner: Does the tasks.
+        job: Which job it is.
+
+    Returns:
+        The job's result, JSON: what its kind makes.
+
+    Raises:
+        Problem: Bad input, or a check that does not hold.
+    """
+    plan = plan_of_job(spec, scenes)
+    if spec.kind == "build":
+        return _build_job(plan, runner, job)
+    if spec.kind == "train" and spec.dataset is not None:
+        return _train_on_dataset(plan, runner, spec.dataset)
+    entries = steps.read_scenes(plan, runner)
+    rendered = steps.render_views(plan, runner, entries)
+    if spec.kind == "render":
+        return {"views": [_view_result(view) for view in rendered]}
+    views = steps.label_views(plan, runner, rendered)
+    dataset = _record_dataset(plan, runner, views)
+    if spec.kind == "train":
+        champion = runner.registry.champion(plan.name)
+        return {"dataset": dataset, **_publish_unscored(runner, _learn(plan, runner, entries, views, champion))}
+    if spec.kind == "evaluate":
+        return {"dataset": dataset, **_evaluate_job(plan, runner, views, str(spec.model))}
+    return {"dataset": dataset, "views": [_view_result(view.rendered) for view in views]}
+
+
+def _build_job(plan: Plan, runner: Runner, job: JobContext) -> dict[str, Any]:
+    built = build(plan, runner)
+    held_out = [m for view in built.evaluated if view.labelled.scene.held_out for m in view.measurements]
+    baseline = [m for m in held_out if m.technique != summary.BUNDLE]
+    rival = [*baseline, *built.rival] if built.rival else []
+    labels = sorted({m.scene for m in held_out})
+    data = report_data(built, f"diaphane jobs show {job.id}", job.created, runner.progress.skips)
+    shown = [(view.labelled.scene.label, task) for view in built.evaluated for task in view.tasks]
+    report = _keep_report(runner, tasks.report_task(plan.name, data, shown))
+    return {
+        "reference": built.registered.reference,
+        "score": built.registered.score,
+        "champion": built.registered.champion,
+        "reason": built.registered.reason,
+        "rival_score": built.rival_score,
+        "per_scene": {
+            label: {
+                "score": summary.score(m for m in held_out if m.scene == label),
+                "rival": summary.score(m for m in rival if m.scene == label),
+            }
+            for label in labels
+        },
+        "dataset": _record_dataset(plan, runner, built.views),
+        "report": report,
+    }
+
+
+def _evaluate_job(plan: Plan, runner: Runner, views: Sequence[LabelledView], model: str) -> dict[str, Any]:
+    publication = runner.registry.resolve(model)
+    evaluated = steps.evaluate_views(plan, runner, views, source_of_version(runner.registry.record(publication)), None)
+    reference = f"{publication.name}@{publication.version}"
+    _record(runner, evaluated, reference)
+    measured = [m for view in evaluated for m in view.measurements]
+    per_scene = {
+        label: {"score": summary.score(m for m in measured if m.scene == label)}
+        for label in sorted({m.scene for m in measured})
+    }
+    return {"reference": reference, "score": summary.score(measured), "per_scene": per_scene}
+
+
+def _train_on_dataset(plan: Plan, runner: Runner, dataset: str) -> dict[str, Any]:
+    record = runner.measured.dataset(dataset)
+    shards = [(shard.scene_digest, shard.artifact) for shard in record.shards]
+    scenes = {shard.scene: shard.scene_digest for shard in record.shards}
+    start = _start(plan, runner, runner.registry.champion(plan.name))
+    bundle = steps.learn(plan.described_by(record.settings), runner, shards, scenes, {}, start)
+    return {"dataset": dataset, **_publish_unscored(runner, bundle)}
+
+
+def _learn(
+    plan: Plan,
+    runner: Runner,
+    scenes: Sequence[SceneEntry],
+    views: Sequence[LabelledView],
+    champion: Publication | None,
+) -> Bundle:
+    shards = [(view.scene.digest, view.task.artifact) for view in views if not view.scene.held_out]
+    if not shards:
+        raise Problem("No training view is left.", "See why the tasks failed, or add scenes.", ExitCode.CHECK_FAILED)
+    trained, held_out = (
+        {scene.label: scene.digest for scene in scenes if scene.held_out == held} for held in (False, True)
     )
-    report = options.state / "reports" / options.name / "index.html"
-    if work.worked or not report.is_file():
-        with progress.stage("report", 1) as stage:
-            write_report(report, data, _pictures(work, evaluated))
-            stage.advance(1)
-    return BuildResult(
-        report=report,
-        registry=registered,
-        held_out=tuple(scene.label for scene in scenes if scene.held_out),
-        measurements=data.measurements,
-        skipped=dict(progress.skips),
-        worked=work.worked,
-        seconds=time.monotonic() - started,
-    )
+    return steps.learn(plan, runner, shards, trained, held_out, _start(plan, runner, champion))
 
 
-def command_line(options: BuildOptions) -> str:
-    """The command that asks for this build again."""
-    parts = ["diaphane", "build", *map(str, options.scenes)]
-    parts += ["--budgets", ",".join(f"{budget:g}" for budget in options.budgets)]
-    parts += ["--name", options.name, "--size", f"{options.width}x{options.height}"]
-    parts += ["--alpha", f"{options.alpha:g}"] if options.alpha is not None else []
-    for scene in options.holdout:
-        parts += ["--holdout", str(scene)]
-    parts += ["--views", str(options.views)] if options.views is not None else []
-    parts += ["--views-per-scene", str(options.views_per_scene), "--tail", options.tail, "--g", f"{options.g:g}"]
-    parts += ["--seed", str(options.seed)]
-    parts += ["--steps", str(options.steps)] if options.steps is not None else []
-    return shlex.join(parts)
+def _start(plan: Plan, runner: Runner, champion: Publication | None) -> Source | None:
+    """The weights that the training begins with: without a champion yet, from scratch."""
+    if champion is None or not plan.from_champion:
+        return None
+    return source_of_version(runner.registry.record(champion))
 
 
-def _require_views(scenes: Sequence[SceneEntry], views: Sequence[LabelledView]) -> None:
-    seen = {view.scene.held_out for view in views}
-    for held_out, purpose in ((False, "train on"), (True, "evaluate on")):
-        names = ", ".join(scene.label for scene in scenes if scene.held_out == held_out)
-        if names and held_out not in seen:
-            raise Problem(
-                f"No view of {names} shows a transparent surface, so there is nothing to {purpose}.",
-                "Give views with --views, choose --holdout otherwise, or add scenes.",
-                ExitCode.CHECK_FAILED,
-            )
+def _rival(
+    plan: Plan,
+    runner: Runner,
+    held_out: Sequence[EvaluatedView],
+    champion: Publication | None,
+    bundle: Bundle,
+) -> tuple[Measurement, ...]:
+    """The champion on the same views; nothing if there is no other one, or it was trained on one of their scenes."""
+    if champion is None or champion.digest == bundle.digest or not held_out:
+        return ()
+    trained_on = set(load_manifest(runner.registry.folder(champion)).provenance.scenes.values())
+    if trained_on & {view.labelled.scene.digest for view in held_out}:
+        return ()
+    return steps.measure_rival(plan, runner, held_out, source_of_version(runner.registry.record(champion)))
 
 
-def _note_exact_budgets(work: Workspace, views: Sequence[LabelledView]) -> None:
-    for factor, fragments in zip(work.options.budgets, work.budgets, strict=True):
-        exact = sum(fragments >= view.rendered.total for view in views)
-        if exact:
-            work.progress.skipped(f"views that a budget of {factor:g} holds completely: exact without predictor", exact)
+def _publish(
+    plan: Plan, runner: Runner, bundle: Bundle, held_out: Sequence[EvaluatedView], rival: Sequence[Measurement]
+) -> tuple[RegistryResult, float | None]:
+    """Publishes a bundle with its score on the held-out views; the better one of it and the champion is champion."""
+    measured = [m for view in held_out for m in view.measurements]
+    score = summary.score(measured)
+    baseline = [m for m in measured if m.technique != summary.BUNDLE]
+    rival_score = summary.score([*baseline, *rival]) if rival and score is not None else None
+    evaluation = {
+        "views": sorted(view.labelled.rendered.task.address.key for view in held_out),
+        "budgets": list(plan.budgets),
+        "tail": plan.tail,
+        "g": plan.g,
+    }
+
+    def body() -> dict[str, Any]:
+        publication = _into_registry(runner, bundle, score, evaluation)
+        promoted, reason = runner.registry.consider(publication, score, rival_score, promote=plan.promote)
+        reference = f"{publication.name}@{publication.version}"
+        folder = str(runner.registry.folder(publication))
+        return {"reference": reference, "folder": folder, "champion": promoted, "reason": reason, "score": score}
+
+    return RegistryResult.model_validate(runner.step("publish", body)), rival_score
 
 
-def _scene_summary(scene: SceneEntry, views: Sequence[LabelledView]) -> SceneSummary:
-    own = [view.rendered for view in views if view.scene.label == scene.label]
+def _publish_unscored(runner: Runner, bundle: Bundle) -> dict[str, Any]:
+    """Publishes what was not measured: a version without a score, which nothing promotes by itself."""
+
+    def body() -> dict[str, Any]:
+        publication = _into_registry(runner, bundle, None, {})
+        _, reason = runner.registry.consider(publication, None, None, promote=False)
+        return {
+            "reference": f"{publication.name}@{publication.version}",
+            "score": None,
+            "champion": False,
+            "reason": reason,
+        }
+
+    published: dict[str, Any] = runner.step("publish", body)
+    return published
+
+
+def _into_registry(runner: Runner, bundle: Bundle, score: float | None, evaluation: Mapping[str, Any]) -> Publication:
+    folder = runner.store.fetch(bundle.task.artifact) / BUNDLE
+    known = {publication.digest for publication in runner.registry.versions(bundle.name)}
+    if bundle.digest in known:
+        runner.progress.skipped("bundles already published")
+    artifacts = (bundle.task.artifact, *bundle.task.needs)
+    return runner.registry.publish(bundle.name, folder, score, evaluation, artifacts=artifacts, job_id=runner.job_id)
+
+
+def _record(runner: Runner, evaluated: Sequence[EvaluatedView], reference: str) -> None:
+    """Keeps the measurements, so that they can be asked for."""
+
+    def body() -> int:
+        for view in evaluated:
+            digests = {view.labelled.scene.label: view.labelled.scene.digest}
+            for task in view.tasks:
+                kind = task.params["kind"]
+                own = [m for m in view.measurements if (m.technique == summary.BUNDLE) == (kind == "bundle")]
+                model = reference if kind == "bundle" else None
+                runner.measured.record(task.artifact, own, digests, model, runner.job_id)
+        return len(evaluated)
+
+    runner.step("record measurements", body)
+
+
+def _record_dataset(plan: Plan, runner: Runner, views: Sequence[LabelledView]) -> str:
+    shards = [
+        ShardRef(
+            scene=view.scene.label,
+            scene_digest=view.scene.digest,
+            view=view.rendered.view.name,
+            artifact=view.task.artifact,
+            sha256=view.facts["shard"]["sha256"],
+            bytes=view.facts["shard"]["bytes"],
+        )
+        for view in views
+        if not view.scene.held_out
+    ]
+
+    def body() -> str:
+        return runner.measured.record_dataset(plan.settings, shards, runner.job_id).id
+
+    return str(runner.step("record data set", body))
+
+
+def _keep_report(runner: Runner, task: Task) -> str | None:
+    """The page as a blob, so that it can be asked for by its hash; None if it could not be written."""
+    (facts,) = runner.map("report", [task])
+    if facts is None:
+        return None
+
+    def body() -> str:
+        return runner.blobs.put_file(runner.store.fetch(task.artifact) / PAGE).sha256
+
+    return str(runner.step("keep report", body))
+
+
+def _view_result(view: RenderedView) -> dict[str, Any]:
+    return {
+        "scene": view.scene.label,
+        "view": view.view.name,
+        "fragments": view.total,
+        "artifact": view.task.artifact,
+    }
+
+
+def _scene_summary(scene: SceneEntry, views: Sequence[RenderedView]) -> SceneSummary:
     return SceneSummary(
         label=scene.label,
         held_out=scene.held_out,
         views=len(scene.views),
         triangles=scene.triangles,
-        fragments=sum(view.total for view in own),
+        fragments=sum(view.total for view in views if view.scene.label == scene.label),
         warnings=scene.warnings,
-    )
-
-
-def _provenance(options: BuildOptions, scenes: Sequence[SceneEntry], bundle: Bundle) -> dict[str, object]:
-    return {
-        "seed": options.seed,
-        "tail": options.tail,
-        "g": options.g,
-        "alpha": options.alpha,
-        "bundle": bundle_digest(bundle.folder),
-        "scenes": {scene.label: scene.digest for scene in scenes},
-    }
-
-
-def _pictures(work: Workspace, evaluated: Sequence[EvaluatedView]) -> Iterator[PictureSet]:
-    """The first views of each scene, at the middle one of the budgets that are not exact there."""
-    shown: dict[str, int] = {}
-    for view in evaluated:
-        label = view.labelled.scene.label
-        budgets = sorted({m.budget_factor for m in summary.compared(view.measurements)})
-        if not budgets or shown.get(label, 0) >= SHOWN_VIEWS:
-            continue
-        shown[label] = shown.get(label, 0) + 1
-        yield _picture_set(view, budgets[len(budgets) // 2])
-
-
-def _picture_set(view: EvaluatedView, factor: float) -> PictureSet:
-    techniques = {}
-    for m in summary.compared(view.measurements):
-        if m.budget_factor != factor:
-            continue
-        base = view.folders[m.technique] / stem(m.technique, factor)
-        techniques[m.technique] = Picture(
-            image=read_png(base.with_name(base.name + ".png")),
-            flip=read_png(base.with_name(base.name + ".flip.png")).astype(np.float32) / np.float32(255.0),
-            k=read_png(base.with_name(base.name + ".k.png")),
-        )
-    return PictureSet(
-        scene=view.labelled.scene.label,
-        view=view.labelled.rendered.view.name,
-        budget_factor=factor,
-        exact=read_png(view.folders["sbuffer"] / EXACT),
-        techniques=techniques,
     )

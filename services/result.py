@@ -10,7 +10,7 @@ from schemas.measurement import Measurement, RegistryResult
 
 
 class BuildResult(BaseModel):
-    """Outcome of `services.pipeline.build`.
+    """Outcome of `services.build.build`.
 
     Attributes:
         report: The HTML report.

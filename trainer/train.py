@@ -90,6 +90,7 @@ def train(
     config: TrainConfig,
     progress: Progress | None = None,
     checkpoint: Path | None = None,
+    start: Weights | None = None,
 ) -> TrainResult:
     """Train a gain-curve network.
 
@@ -100,16 +101,18 @@ def train(
         progress: Told how it goes.
         checkpoint: File to write the state to from time to time, and to continue from if it belongs to the same
             data and configuration.
+        start: Network to begin with, with its features and their normalisation; None: weights drawn by the seed.
 
     Returns:
         The best state. The same for the same data, configuration and number of threads, interrupted or not.
     """
     with _deterministic(config.threads):
-        model = _new_model(views, config)
+        model = _new_model(views, config) if start is None else GainCurve.from_weights(start)
         columns = model.weights().columns
         validation = [view.subset(config.validation_rows, config.seed) for view in (held_out or views)]
         optimiser = Adam(model.parameters())
-        key = data_key(config.model_dump_json(exclude={"checkpoint_seconds"}), [*views, *held_out])
+        began = config.model_dump_json(exclude={"checkpoint_seconds"}) + ("" if start is None else start.digest())
+        key = data_key(began, [*views, *held_out])
         state = Checkpoint.fresh(model)
         if checkpoint is not None:
             state = load_checkpoint(checkpoint, key, model, optimiser) or state

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,6 +47,13 @@ class Weights:
     def hidden(self) -> tuple[int, ...]:
         """Units of each hidden layer."""
         return tuple(len(bias) for _, bias in self.layers[:-1])
+
+    def digest(self) -> str:
+        """Hex sha256 over everything that decides what the network answers."""
+        hasher = hashlib.sha256(json.dumps(self.features).encode())
+        for array in (self.mean, self.std, *(array for layer in self.layers for array in layer)):
+            hasher.update(np.ascontiguousarray(array).tobytes())
+        return hasher.hexdigest()
 
     def predict(self, features: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Gain curves of pixels.

@@ -64,9 +64,9 @@ def build(
         state=state,
     )
     # The pipeline loads torch and numba: only once the options are known to be good.
-    from services import pipeline
+    from services.build import build as run
 
-    result = pipeline.build(options, make_progress(sys.stderr, silent=as_json))
+    result = run(options, make_progress(sys.stderr, silent=as_json))
     if as_json:
         output.print_json(result.model_dump(mode="json"))
     else:

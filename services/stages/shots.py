@@ -20,10 +20,10 @@ from schemas.colour import display8
 from schemas.fragments import FragmentDump
 from schemas.measurement import Measurement
 from schemas.problem import ExitCode, Problem
-from services.stages.label import LabelledView
+from schemas.view import View
+from services.stages.desk import Desk
 from services.stages.pictures import EXACT, quantise_map, stem, write_png
-from services.stages.render import frame_of
-from services.stages.workspace import Workspace
+from services.tasks import Task
 
 AGREEMENT = 1
 """Steps of 1/255 by which a GL picture may differ from the CPU simulation of its own allocation, in any channel."""
@@ -35,22 +35,23 @@ class Session:
     """A view being evaluated: what its shots share, made when first needed.
 
     Args:
-        work: The build.
-        view: The view.
+        desk: Artifacts and the scene on the GPU.
+        task: The evaluation.
     """
 
-    def __init__(self, work: Workspace, view: LabelledView) -> None:
-        self.work, self.view = work, view
+    def __init__(self, desk: Desk, task: Task) -> None:
+        self.desk, self.task = desk, task
+        self.tail, self.g = task.params["tail"], task.params["g"]
 
     @cached_property
     def frame(self) -> Frame:
         """The view on the GPU."""
-        return frame_of(self.work, self.view.scene, self.view.rendered.view)
+        return self.desk.frame(self.task)
 
     @cached_property
     def dump(self) -> FragmentDump:
         """Its fragments."""
-        return read_dump(self.view.rendered.folder)
+        return read_dump(self.desk.artifact(self.task, "render"))
 
     @cached_property
     def exact(self) -> NDArray[np.uint8]:
@@ -59,17 +60,16 @@ class Session:
 
     def simulate(self, k: NDArray[np.int32]) -> NDArray[np.uint8]:
         """The CPU's picture of an allocation, uint8 [H, W, 3]."""
-        options = self.work.options
-        linear = composite(self.dump, k, options.tail, options.g)
-        return display8(linear.reshape(options.height, options.width, 3))
+        width, height = self.task.params["size"]
+        return display8(composite(self.dump, k, self.tail, self.g).reshape(height, width, 3))
 
     def render(self, make: Callable[[Frame], Technique], budget: Budget) -> Rendered:
         """A technique's picture; drivers compile shaders at their first use, so that is not the one measured."""
         technique = make(self.frame)
-        compiled = self.work.compiled(self.view.scene.path)
+        compiled = self.desk.compiled(self.task)
         if technique.name not in compiled:
             compiled.add(technique.name)
-            small = Frame(self.work.gpu(self.view.scene.path), self.view.rendered.view, *_WARM_SIZE)
+            small = Frame(self.desk.gpu(self.task), View.model_validate(self.task.params["view"]), *_WARM_SIZE)
             share = max(1, budget.fragments * small.pixels // self.frame.pixels)
             make(small).render(small, Budget(share, budget.tail, budget.g))
         return technique.render(self.frame, budget)
@@ -93,7 +93,7 @@ class Shot:
 
     def take(self, name: str, make: Callable[[Frame], Technique]) -> Measurement:
         """Render with the technique that `make` gives for a frame, compare, keep the pictures."""
-        if self.fragments >= self.session.view.rendered.total:
+        if self.fragments >= self.session.dump.total:
             why = "the budget holds every fragment: every technique is exact"
             return self._record(name, exact=True, skipped=why, mse=0.0)
         return self._take(name, make, exact=False)
@@ -103,9 +103,8 @@ class Shot:
         return self._take(SBuffer.name, lambda _: SBuffer(), exact=True)
 
     def _take(self, name: str, make: Callable[[Frame], Technique], exact: bool) -> Measurement:
-        options = self.session.work.options
         try:
-            rendered = self.session.render(make, Budget(self.fragments, options.tail, options.g))
+            rendered = self.session.render(make, Budget(self.fragments, self.session.tail, self.session.g))
         except Problem as problem:
             if problem.code != ExitCode.LIMIT:
                 raise
@@ -149,27 +148,28 @@ class Shot:
 
     def _require_agreement(self, name: str, difference: int) -> None:
         if difference > AGREEMENT:
-            view = self.session.view
             raise Problem(
-                f"The GL picture of {name} ({view.scene.label}, {view.rendered.view.name}) differs from the CPU "
-                f"simulation of the same allocation by {difference}/255.",
+                f"The GL picture of {name} ({self.session.task.name}) differs from the CPU simulation of the same "
+                f"allocation by {difference}/255.",
                 "This is a defect of the driver or of Diaphane: please report it with the scene.",
                 ExitCode.CHECK_FAILED,
             )
 
     def _record(self, name: str, **measured: Any) -> Measurement:
-        options, view = self.session.work.options, self.session.view
+        """Without the scene's label, which is no part of the artifact: another run may call the scene otherwise."""
+        params = self.session.task.params
+        width, height = params["size"]
         return Measurement(
-            scene=view.scene.label,
-            view=view.rendered.view.name,
+            scene="",
+            view=params["view"]["name"],
             technique=name,
             budget=self.fragments,
             budget_factor=self.factor,
-            width=options.width,
-            height=options.height,
-            alpha=options.alpha,
-            tail=options.tail,
-            total_fragments=view.rendered.total,
+            width=width,
+            height=height,
+            alpha=params["alpha"],
+            tail=self.session.tail,
+            total_fragments=self.session.dump.total,
             **measured,
         )
 

@@ -11,10 +11,11 @@ import pytest
 from renderer.samples import write_samples
 from schemas.bundle import load_manifest
 from schemas.problem import Problem
-from services import pipeline, summary
+from services import steps, summary
+from services.build import build
 from services.options import BuildOptions
 from services.progress import SilentProgress
-from services.registry import Registry
+from services.local import open_local
 from services.result import BuildResult
 
 TRAIN = ("nested_shells.usda", "torus_knots.usdc")
@@ -51,11 +52,12 @@ def state(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def built(samples: Path, state: Path) -> BuildResult:
-    return pipeline.build(options(samples, state), SilentProgress())
+    return build(options(samples, state), SilentProgress())
 
 
 def test_build_publishes_a_proven_bundle(built: BuildResult, state: Path) -> None:
-    publication = Registry(state / "registry").resolve("small@champion")
+    with open_local(state) as local:
+        publication = local.registry.resolve("small@champion")
     manifest = load_manifest(Path(built.registry.folder))
     assert built.registry.champion
     assert publication.score == built.registry.score
@@ -95,7 +97,7 @@ def test_report_stands_alone(built: BuildResult) -> None:
 
 def test_same_command_again_does_nothing_and_is_quick(built: BuildResult, samples: Path, state: Path) -> None:
     started = time.monotonic()
-    again = pipeline.build(options(samples, state), SilentProgress())
+    again = build(options(samples, state), SilentProgress())
     assert not again.worked
     assert time.monotonic() - started < 5.0
     assert again.registry.reference == built.registry.reference
@@ -106,7 +108,7 @@ def test_an_added_scene_is_the_only_one_rendered_and_labelled(built: BuildResult
     more = options(samples, state, scenes=(*TRAIN, HELD_OUT, "bottles.usdc"))
     store = state / "store"
     before = {stage: len(list((store / stage).glob("*/*"))) for stage in ("render", "label")}
-    result = pipeline.build(more, SilentProgress())
+    result = build(more, SilentProgress())
     after = {stage: len(list((store / stage).glob("*/*"))) for stage in ("render", "label")}
     assert {stage: after[stage] - before[stage] for stage in before} == {"render": 3, "label": 3}
     assert result.skipped["baseline pictures already rendered"] == 3
@@ -119,16 +121,16 @@ def test_interrupted_build_continues(samples: Path, tmp_path: Path, monkeypatch:
 
     wanted = options(samples, tmp_path, scenes=(TRAIN[0], HELD_OUT), steps=50)
     with monkeypatch.context() as patch:
-        patch.setattr(pipeline, "learn", interrupted)
+        patch.setattr(steps, "learn", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            pipeline.build(wanted, SilentProgress())
-    result = pipeline.build(wanted, SilentProgress())
+            build(wanted, SilentProgress())
+    result = build(wanted, SilentProgress())
     assert result.skipped["views already captured"] == 6
     assert result.skipped["views already labelled"] == 6
 
 
 def test_budget_beyond_all_fragments_is_exact_and_says_so(samples: Path, tmp_path: Path) -> None:
-    result = pipeline.build(
+    result = build(
         options(samples, tmp_path, scenes=(TRAIN[0], HELD_OUT), budgets=(1.0, 64.0), steps=50), SilentProgress()
     )
     beyond = [m for m in result.measurements if m.budget_factor == 64.0]
@@ -146,8 +148,8 @@ def test_opaque_scene_is_refused_with_the_way_out(tmp_path: Path) -> None:
     scene.write_text('#usda 1.0\n(defaultPrim = "C")\ndef Cube "C" {}\n', encoding="utf-8")
     wanted = BuildOptions(scenes=(scene,), name="solid", width=64, height=48, state=tmp_path / "state", steps=20)
     with pytest.raises(Problem, match=r"solid.*--alpha 0\.33"):
-        pipeline.build(wanted, SilentProgress())
-    made = pipeline.build(
+        build(wanted, SilentProgress())
+    made = build(
         BuildOptions(
             scenes=(scene,),
             name="solid",
@@ -170,7 +172,7 @@ def test_a_copy_of_a_scene_is_refused_since_the_split_is_by_content(samples: Pat
     copy.write_bytes((samples / HELD_OUT).read_bytes())
     wanted = options(samples, tmp_path, scenes=(HELD_OUT,), holdout=())
     with pytest.raises(Problem, match="voxel_town and other_name have the same content"):
-        pipeline.build(
+        build(
             BuildOptions(scenes=(*wanted.scenes, copy), name="twins", holdout=(copy,), state=tmp_path), SilentProgress()
         )
 
@@ -178,6 +180,6 @@ def test_a_copy_of_a_scene_is_refused_since_the_split_is_by_content(samples: Pat
 def test_a_champion_trained_on_a_held_out_scene_is_not_compared_and_stays(
     built: BuildResult, samples: Path, state: Path
 ) -> None:
-    result = pipeline.build(options(samples, state, holdout=(samples / TRAIN[0],), steps=60), SilentProgress())
+    result = build(options(samples, state, holdout=(samples / TRAIN[0],), steps=60), SilentProgress())
     assert not result.registry.champion
     assert "trained on" in result.registry.reason

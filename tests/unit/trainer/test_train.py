@@ -60,6 +60,21 @@ def test_the_best_state_is_kept(result: TrainResult, data: tuple[list[ViewData],
     assert geometric_mean(evaluate(result.weights, data[1])) == pytest.approx(result.score)
 
 
+def test_a_training_can_begin_with_the_weights_of_another(
+    data: tuple[list[ViewData], list[ViewData]], tmp_path: Path
+) -> None:
+    first = train(*data, CONFIG.model_copy(update={"steps": 200, "validate_every": 100}))
+    short = CONFIG.model_copy(update={"steps": 5, "validate_every": 5, "lr": 0.25 * CONFIG.lr})
+    tuned = train(*data, short, start=first.weights)
+    assert tuned.score < train(*data, short).score
+    assert tuned.weights.features == first.weights.features
+    np.testing.assert_array_equal(tuned.weights.mean, first.weights.mean)
+    # A checkpoint of the training from scratch is not that of this one.
+    path = tmp_path / "checkpoint.safetensors"
+    train(*data, short, checkpoint=path)
+    assert_same(train(*data, short, checkpoint=path, start=first.weights).weights, tuned.weights)
+
+
 def test_a_killed_training_continues_exactly(
     data: tuple[list[ViewData], list[ViewData]], result: TrainResult, tmp_path: Path
 ) -> None:

@@ -1,0 +1,127 @@
+"""What the pipeline knows while it runs: scenes, views and bundles with the tasks that made them and their facts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from schemas.measurement import Certificate, Measurement, TrainingPoint
+from schemas.view import View
+from services.tasks import Facts, Source, Task
+
+
+@dataclass(frozen=True, slots=True)
+class SceneEntry:
+    """A scene that was read.
+
+    Attributes:
+        label: Unique short name.
+        source: Its files.
+        held_out: Whether it is evaluated on and never trained on.
+        views: Its views.
+        triangles: Number of triangles.
+        opaque: Whether nothing in it is transparent.
+        content: Hash of the root file alone.
+        warnings: What of the file was not supported or was missing.
+    """
+
+    label: str
+    source: Source
+    held_out: bool
+    views: tuple[View, ...]
+    triangles: int
+    opaque: bool
+    content: str
+    warnings: tuple[str, ...]
+
+    @property
+    def digest(self) -> str:
+        """Content hash of the scene and all that it refers to."""
+        return self.source.digest
+
+
+@dataclass(frozen=True, slots=True)
+class RenderedView:
+    """A view whose fragments are known.
+
+    Attributes:
+        scene: The scene it is a view of.
+        view: The camera.
+        task: That made the dump.
+        total: N, its fragments.
+    """
+
+    scene: SceneEntry
+    view: View
+    task: Task
+    total: int
+
+    @property
+    def title(self) -> str:
+        """Scene and view in words."""
+        return f"{self.scene.label} {self.view.name}"
+
+
+@dataclass(frozen=True, slots=True)
+class LabelledView:
+    """A view with its curves and allocations.
+
+    Attributes:
+        rendered: The view.
+        task: That made the labels.
+        facts: Of the labels: errors by rule, certificates, the shard.
+        certificates: Of the optimal allocation, and the errors of the other rules, one per budget.
+    """
+
+    rendered: RenderedView
+    task: Task
+    facts: Facts
+    certificates: tuple[Certificate, ...]
+
+    @property
+    def scene(self) -> SceneEntry:
+        """The scene it is a view of."""
+        return self.rendered.scene
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """An exported bundle.
+
+    Attributes:
+        task: That exported it.
+        train: That trained it.
+        digest: Over its files.
+        files: Name -> hex sha256.
+        history: How its training went.
+    """
+
+    task: Task
+    train: Task
+    digest: str
+    files: dict[str, str]
+    history: tuple[TrainingPoint, ...]
+
+    @property
+    def name(self) -> str:
+        """Name that it is published under."""
+        return str(self.task.params["name"])
+
+    @property
+    def source(self) -> Source:
+        """Names it by its digest; its files lie in the artifact."""
+        return Source(digest=self.digest, trusted=True)
+
+
+@dataclass(frozen=True, slots=True)
+class EvaluatedView:
+    """Measurements of one view.
+
+    Attributes:
+        labelled: The view.
+        tasks: That rendered its pictures: the baselines' first, then the bundle's.
+        measurements: Of all techniques and budgets.
+    """
+
+    labelled: LabelledView
+    tasks: tuple[Task, ...]
+    measurements: tuple[Measurement, ...]

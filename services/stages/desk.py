@@ -1,0 +1,136 @@
+"""What the bodies of all stages share: artifacts, and the scene that is on the GPU right now."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from schemas.problem import ExitCode, Problem
+from services.store import Store
+from services.tasks import FACTS, Facts, Source, Task
+
+if TYPE_CHECKING:
+    from renderer.frame import Frame
+    from renderer.gpu_scene import GpuScene
+    from schemas.scene import SceneArrays
+
+BUNDLE = "bundle"
+"""Folder of the bundle in an `export` artifact."""
+PAGE = "index.html"
+"""File of the page in a `report` artifact."""
+SHARD = "shard.safetensors"
+"""File of the training rows in a `label` artifact."""
+
+FolderOf = Callable[[Source], Path]
+"""Where the files of a source lie on this machine."""
+
+
+class Desk:
+    """State of a process that does tasks one after the other.
+
+    Args:
+        store: Where artifacts lie.
+        folder_of: Where sources lie.
+    """
+
+    def __init__(self, store: Store, folder_of: FolderOf) -> None:
+        self.store, self._folder_of = store, folder_of
+        self._loaded: tuple[str, float | None] | None = None
+        self._scene: SceneArrays | None = None
+        self._gpu: GpuScene | None = None
+        self._compiled: set[str] = set()
+
+    def artifact(self, task: Task, stage: str) -> Path:
+        """Folder of the one artifact of a stage that the task needs."""
+        (needed,) = (need for need in task.needs if need.startswith(f"{stage}/"))
+        return self.store.fetch(needed)
+
+    def facts(self, artifact: str) -> Facts:
+        """Facts of an artifact."""
+        return load_facts(self.store.fetch(artifact))
+
+    def scene_path(self, task: Task) -> Path:
+        """The file that a task's scene is opened from."""
+        source = _present(task.scene, task)
+        if source.root.lower().endswith(".glb"):
+            from renderer.convert import stage_file
+
+            converted: Path = stage_file(self._folder_of(source), source.root, self.cache)
+            return converted
+        return self._folder_of(source) / source.root
+
+    def bundle(self, task: Task) -> Path:
+        """Folder of the bundle that a task reads: a published one, or one just exported."""
+        if any(need.startswith("export/") for need in task.needs):
+            return self.artifact(task, "export") / BUNDLE
+        return self._folder_of(_present(task.bundle, task))
+
+    @property
+    def cache(self) -> Path:
+        """Folder for what can be made again at any time."""
+        folder = self.store.root / "tmp"
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder
+
+    def checkpoint(self, task: Task) -> Path:
+        """File that an interrupted training goes on from: the artifact's key names exactly this training."""
+        folder = self.store.root.parent / "checkpoints"
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder / f"{task.address.key}.safetensors"
+
+    def scene(self, task: Task) -> SceneArrays:
+        """The scene's triangles; only the last one asked for is kept in memory."""
+        from renderer.scene import LoadOptions, load_scene
+
+        alpha = task.params["alpha"]
+        wanted = _present(task.scene, task).digest, alpha
+        if self._scene is None or self._loaded != wanted:
+            self._gpu, self._scene = None, None
+            self._scene = load_scene(self.scene_path(task), LoadOptions(alpha=alpha))
+            self._loaded = wanted
+        return self._scene
+
+    def gpu(self, task: Task) -> GpuScene:
+        """The scene on the GPU: all views of a scene reuse one upload."""
+        from renderer.context import gl_context
+        from renderer.gpu_scene import GpuScene
+
+        scene = self.scene(task)
+        if self._gpu is None:
+            self._gpu = GpuScene(gl_context(), scene)
+            self._compiled = set()
+        return self._gpu
+
+    def compiled(self, task: Task) -> set[str]:
+        """Names of the techniques whose shaders were compiled for the scene on the GPU."""
+        self.gpu(task)
+        return self._compiled
+
+    def frame(self, task: Task) -> Frame:
+        """The frame of a task's view on the GPU."""
+        from renderer.frame import Frame
+        from schemas.view import View
+
+        width, height = task.params["size"]
+        return Frame(self.gpu(task), View.model_validate(task.params["view"]), width, height)
+
+
+def save_facts(folder: Path, facts: Facts) -> None:
+    """Writes what the pipeline has to know of an artifact."""
+    (folder / FACTS).write_text(json.dumps(facts, allow_nan=False), encoding="utf-8")
+
+
+def load_facts(folder: Path) -> Facts:
+    """Reads what `save_facts` wrote."""
+    facts: dict[str, Any] = json.loads((folder / FACTS).read_text(encoding="utf-8"))
+    return facts
+
+
+def _present(source: Source | None, task: Task) -> Source:
+    if source is None:
+        raise Problem(
+            f"The task {task.stage} {task.name} names no files.", "Submit the job again.", ExitCode.CHECK_FAILED
+        )
+    return source

@@ -1,0 +1,220 @@
+"""The task of every stage: what an artifact is made from decides where it lies. Loads no renderer and no trainer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+from schemas.tail import MetricName
+from schemas.view import View
+from services.plan import Plan, PlannedScene
+from services.records import LabelledView, RenderedView, SceneEntry
+from services.tasks import Source, StageName, Task
+from services.versions import code_version
+
+METRIC: MetricName = "display"
+
+EvaluationKind = Literal["baseline", "bundle"]
+
+_SOURCES: Mapping[StageName, tuple[str, ...]] = {
+    "scene": (
+        *("schemas.scene", "schemas.view", "schemas.colour"),
+        *("renderer.scene", "renderer.usd", "renderer.views", "renderer.convert"),
+        "services.stages.scenes",
+    ),
+    "render": (
+        "schemas.fragments",
+        *(f"renderer.{name}" for name in ("capture", "csr", "dump", "frame", "gpu_scene", "programs")),
+        *(f"renderer.shaders.{name}" for name in ("common", "opaque", "count", "gather", "capture")),
+        "services.stages.render",
+    ),
+    "label": (
+        *("labeller", "renderer.allocation", "renderer.features", "renderer.dump", "schemas.tail", "schemas.colour"),
+        "services.stages.label",
+    ),
+    "train": (
+        *(f"trainer.{name}" for name in ("checkpoint", "dataset", "evaluate", "loss", "models", "train", "weights")),
+        "services.stages.train",
+    ),
+    "export": (
+        *(f"trainer.{name}" for name in ("bundle", "export_glsl", "export_onnx", "parity")),
+        "schemas.bundle",
+        "services.stages.export",
+    ),
+    "evaluate": (
+        "labeller.curves",
+        *(f"renderer.{name}" for name in ("allocation", "features", "metrics", "shaders", "techniques")),
+        *(f"services.stages.{name}" for name in ("evaluate", "shots", "pictures")),
+    ),
+    "report": ("services.report", "services.templates", "services.summary", "services.stages.report"),
+}
+"""What decides the result of a stage: a change of any of it makes its artifacts anew."""
+
+
+def version_of(stage: StageName) -> str:
+    """Code version of a stage here and now: part of the address of whatever it makes."""
+    if stage == "render":
+        return code_version(*_SOURCES["render"]) + scene_version()
+    return code_version(*_SOURCES[stage])
+
+
+def scene_version() -> str:
+    """Code version of whatever decides what a scene is."""
+    return version_of("scene")
+
+
+def training_version() -> str:
+    """Code version of whatever decides what a bundle is, for its provenance."""
+    return code_version(*_SOURCES["train"], *_SOURCES["export"]) + scene_version()[:8]
+
+
+def scene_task(plan: Plan, scene: PlannedScene) -> Task:
+    """Reads a stage: its views, and what was found in it."""
+    return Task(
+        name=scene.label,
+        stage="scene",
+        version=version_of("scene"),
+        inputs=(scene.source.digest,),
+        params={
+            "alpha": plan.alpha,
+            "views": [view.model_dump(mode="json") for view in scene.listed],
+            "count": plan.views_per_scene,
+            "seed": plan.seed,
+        },
+        scene=scene.source,
+    )
+
+
+def render_task(plan: Plan, scene: SceneEntry, view: View) -> Task:
+    """Captures the fragments of a view."""
+    return Task(
+        name=f"{scene.label} {view.name}",
+        stage="render",
+        version=version_of("render"),
+        inputs=(scene.digest,),
+        params=_picture(plan, view),
+        scene=scene.source,
+    )
+
+
+def label_task(plan: Plan, view: RenderedView) -> Task:
+    """Error curves, allocations and training rows of a view, all budgets in one task."""
+    return Task(
+        name=view.title,
+        stage="label",
+        version=version_of("label"),
+        inputs=(view.task.address.key,),
+        params={**_allocation(plan), "metric": METRIC, "seed": plan.seed},
+        needs=(view.task.artifact,),
+    )
+
+
+def train_task(
+    plan: Plan, shards: Sequence[tuple[str, str]], start: Source | None, config: Mapping[str, Any] | None = None
+) -> Task:
+    """Trains the network.
+
+    Args:
+        plan: Seed and steps.
+        shards: Digest of the asset and label artifact of every training view: an asset's label decides which views are
+            weighted together, so it belongs to the key.
+        start: Bundle whose weights the training begins with.
+        config: Further settings of the trainer.
+    """
+    params: dict[str, Any] = {"seed": plan.seed, "steps": plan.steps, **(config or {})}
+    if start is not None:
+        params["start"] = start.digest
+    return Task(
+        name=plan.name,
+        stage="train",
+        version=version_of("train"),
+        inputs=tuple(f"{digest}:{artifact.partition('/')[2]}" for digest, artifact in shards),
+        params=params,
+        needs=tuple(artifact for _, artifact in shards),
+        bundle=start,
+    )
+
+
+def export_task(plan: Plan, train: Task, scenes: Mapping[str, str], held_out: Mapping[str, str]) -> Task:
+    """Writes the bundle, if its three forms agree.
+
+    Args:
+        plan: Name, tail and settings.
+        train: The training.
+        scenes: Label -> digest of what was trained on.
+        held_out: Label -> digest of what was not.
+    """
+    return Task(
+        name=plan.name,
+        stage="export",
+        version=version_of("export"),
+        inputs=(train.address.key,),
+        params={
+            "name": plan.name,
+            "scenes": dict(scenes),
+            "holdout": dict(held_out),
+            "settings": plan.settings,
+            "code": training_version(),
+        },
+        needs=(train.artifact, *train.needs),
+    )
+
+
+def evaluate_task(
+    plan: Plan, view: LabelledView, kind: EvaluationKind, bundle: Source | None = None, export: Task | None = None
+) -> Task:
+    """Renders and measures a view: with the techniques that need no bundle, or with a bundle.
+
+    Args:
+        plan: Budgets and picture.
+        view: The view.
+        kind: `baseline` or `bundle`.
+        bundle: The bundle, for its digest and, if it is published, its files.
+        export: The task that exported it, if it is not published.
+    """
+    made_from = [view.rendered.task.address.key, view.task.address.key]
+    needs = [view.rendered.task.artifact, view.task.artifact]
+    if export is not None:
+        needs.append(export.artifact)
+    published = bundle is not None and export is None
+    return Task(
+        name=f"{view.rendered.title} {'published ' if published else ''}{kind}",
+        stage="evaluate",
+        version=version_of("evaluate"),
+        inputs=(*made_from, bundle.digest) if bundle is not None else tuple(made_from),
+        params={
+            "kind": kind,
+            **_picture(plan, view.rendered.view),
+            **_allocation(plan),
+            "factors": list(plan.factors),
+        },
+        needs=tuple(needs),
+        scene=view.scene.source,
+        bundle=bundle,
+    )
+
+
+def report_task(name: str, data: Mapping[str, Any], evaluations: Sequence[tuple[str, Task]]) -> Task:
+    """Writes the HTML report.
+
+    Args:
+        name: Of the report.
+        data: `schemas.measurement.ReportData` without measurements, JSON.
+        evaluations: Label of the scene and task, for every evaluation that is shown.
+    """
+    return Task(
+        name=name,
+        stage="report",
+        version=version_of("report"),
+        inputs=tuple(task.address.key for _, task in evaluations),
+        params={"data": dict(data), "labels": [label for label, _ in evaluations]},
+        needs=tuple(task.artifact for _, task in evaluations),
+    )
+
+
+def _picture(plan: Plan, view: View) -> dict[str, Any]:
+    return {"view": view.model_dump(mode="json"), "size": [plan.width, plan.height], "alpha": plan.alpha}
+
+
+def _allocation(plan: Plan) -> dict[str, Any]:
+    return {"budgets": list(plan.budgets), "tail": plan.tail, "g": plan.g}

@@ -1,0 +1,213 @@
+"""The steps of the pipeline: each maps one stage over what the step before it found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from schemas.measurement import Certificate, Measurement, TrainingPoint
+from schemas.problem import ExitCode, Problem
+from schemas.view import View
+from services.plan import Plan, PlannedScene
+from services.records import Bundle, EvaluatedView, LabelledView, RenderedView, SceneEntry
+from services.stages import tasks
+from services.tasks import Facts, Runner, Source, StageName, Task
+
+
+def read_scenes(plan: Plan, runner: Runner) -> tuple[SceneEntry, ...]:
+    """Views and facts of every scene.
+
+    Raises:
+        Problem: A file is not a scene, two are the same, or nothing in them is transparent.
+    """
+    asked = [tasks.scene_task(plan, scene) for scene in plan.scenes]
+    made = _map(runner, "scene", asked)
+    entries = [_entry(scene, facts) for scene, facts in zip(plan.scenes, made, strict=True) if facts is not None]
+    _refuse_copies(entries)
+    return _transparent(runner, entries)
+
+
+def render_views(plan: Plan, runner: Runner, scenes: Sequence[SceneEntry]) -> tuple[RenderedView, ...]:
+    """Dumps of all views that have a transparent fragment; the others are counted as skipped."""
+    views = [(scene, view) for scene in scenes for view in scene.views]
+    asked = [tasks.render_task(plan, scene, view) for scene, view in views]
+    rendered = []
+    for (scene, view), task, facts in zip(views, asked, _map(runner, "render", asked), strict=True):
+        if facts is None:
+            continue
+        if facts["total"] == 0:
+            runner.progress.skipped("views without a transparent pixel")
+            continue
+        rendered.append(RenderedView(scene, view, task, facts["total"]))
+    _require_views(scenes, rendered)
+    for factor, fragments in zip(plan.factors, plan.budgets, strict=True):
+        exact = sum(fragments >= view.total for view in rendered)
+        if exact:
+            what = f"views that a budget of {factor:g} holds completely: exact without predictor"
+            runner.progress.skipped(what, exact)
+    return tuple(rendered)
+
+
+def label_views(plan: Plan, runner: Runner, views: Sequence[RenderedView]) -> tuple[LabelledView, ...]:
+    """Labels of all views: all budgets of a view in one task."""
+    asked = [tasks.label_task(plan, view) for view in views]
+    made = zip(views, asked, _map(runner, "label", asked), strict=True)
+    labelled = [
+        LabelledView(view, task, facts, _certificates(plan, view, facts))
+        for view, task, facts in made
+        if facts is not None
+    ]
+    return tuple(labelled)
+
+
+def learn(
+    plan: Plan,
+    runner: Runner,
+    shards: Sequence[tuple[str, str]],
+    scenes: dict[str, str],
+    held_out: dict[str, str],
+    start: Source | None,
+) -> Bundle:
+    """Train and export.
+
+    Args:
+        plan: What was asked for.
+        runner: Does it.
+        shards: Digest of the asset and label artifact of every training view.
+        scenes: Label -> digest of what is trained on.
+        held_out: Label -> digest of what is not.
+        start: Published version whose weights the training begins with.
+
+    Raises:
+        Problem: There is nothing to learn from, or the exported forms do not agree.
+    """
+    train = tasks.train_task(plan, shards, start)
+    (trained,) = _map(runner, "train", [train])
+    export = tasks.export_task(plan, train, scenes, held_out)
+    (exported,) = _map(runner, "export", [export])
+    assert trained is not None, "a stage of one task has it done, or raises"
+    assert exported is not None, "a stage of one task has it done, or raises"
+    history = tuple(TrainingPoint.model_validate(point) for point in trained["history"])
+    return Bundle(export, train, exported["digest"], exported["files"], history)
+
+
+def evaluate_views(
+    plan: Plan, runner: Runner, views: Sequence[LabelledView], bundle: Source, export: Task | None
+) -> tuple[EvaluatedView, ...]:
+    """Render and measure views with the baselines, the oracle and a bundle.
+
+    Args:
+        plan: What was asked for.
+        runner: Does it.
+        views: Labelled views.
+        bundle: The bundle.
+        export: The task that exported it; None: it is published.
+    """
+    baselines = [tasks.evaluate_task(plan, view, "baseline") for view in views]
+    bundles = [tasks.evaluate_task(plan, view, "bundle", bundle, export) for view in views]
+    # Baseline and bundle of a view follow each other: they share the frame's opaque and gather passes.
+    asked = [task for pair in zip(baselines, bundles, strict=True) for task in pair]
+    made = _map(runner, "evaluate", asked)
+    evaluated = []
+    for index, view in enumerate(views):
+        pair, facts = asked[2 * index : 2 * index + 2], made[2 * index : 2 * index + 2]
+        if all(found is not None for found in facts):
+            measured = tuple(m for found in facts for m in _measurements(view, found))
+            evaluated.append(EvaluatedView(view, tuple(pair), measured))
+    return tuple(evaluated)
+
+
+def measure_rival(plan: Plan, runner: Runner, views: Sequence[EvaluatedView], rival: Source) -> tuple[Measurement, ...]:
+    """A published version on the views that a new one was measured on."""
+    asked = [tasks.evaluate_task(plan, view.labelled, "bundle", rival) for view in views]
+    made = _map(runner, "evaluate", asked)
+    return tuple(m for view, facts in zip(views, made, strict=True) for m in _measurements(view.labelled, facts))
+
+
+def _map(runner: Runner, stage: StageName, asked: Sequence[Task]) -> list[Facts | None]:
+    """The runner's answer; nothing made at all is no answer.
+
+    Raises:
+        Problem: Every task of the stage failed.
+    """
+    made = runner.map(stage, asked)
+    if asked and all(facts is None for facts in made):
+        raise Problem(
+            f"The stage {stage} failed for {'each of its ' if len(asked) > 1 else 'its '}{len(asked)} "
+            f"task{'s' if len(asked) > 1 else ''}.",
+            "See the reasons in the tasks of the job; a retry continues with what was made.",
+            ExitCode.CHECK_FAILED,
+        )
+    return made
+
+
+def _measurements(view: LabelledView, facts: Facts | None) -> list[Measurement]:
+    records = [] if facts is None else facts["measurements"]
+    return [Measurement.model_validate({**record, "scene": view.scene.label}) for record in records]
+
+
+def _entry(scene: PlannedScene, facts: Facts) -> SceneEntry:
+    return SceneEntry(
+        label=scene.label,
+        source=scene.source,
+        held_out=scene.held_out,
+        views=tuple(View.model_validate(view) for view in facts["views"]),
+        triangles=facts["triangles"],
+        opaque=facts["opaque"],
+        content=facts["content"],
+        warnings=tuple(facts["warnings"]),
+    )
+
+
+def _certificates(plan: Plan, view: RenderedView, facts: Facts) -> tuple[Certificate, ...]:
+    return tuple(
+        Certificate(
+            scene=view.scene.label,
+            view=view.view.name,
+            budget_factor=factor,
+            rules={rule: errors[index] for rule, errors in facts["errors"].items() if rule != "optimal"},
+            **facts["certificates"][index],
+        )
+        for index, factor in enumerate(plan.factors)
+    )
+
+
+def _refuse_copies(entries: Sequence[SceneEntry]) -> None:
+    """The split is by asset: a copy of a training scene under another name would prove nothing."""
+    seen: dict[tuple[str, int], str] = {}
+    for entry in entries:
+        # The digest of a scene holds its file names; the root file and what comes of it do not depend on them.
+        content = entry.content, entry.triangles
+        if content in seen:
+            raise Problem(f"{seen[content]} and {entry.label} have the same content.", "Name each scene once.")
+        seen[content] = entry.label
+
+
+def _transparent(runner: Runner, entries: Sequence[SceneEntry]) -> tuple[SceneEntry, ...]:
+    """The scenes that have something transparent; an opaque one among them is left out, and that is said.
+
+    Raises:
+        Problem: None is left, or none to train on, or none of those held out.
+    """
+    opaque = [entry for entry in entries if entry.opaque]
+    kept = [entry for entry in entries if not entry.opaque]
+    if opaque:
+        names = ", ".join(entry.label for entry in opaque)
+        why = f"Nothing in {names} is transparent, so there is nothing to allocate."
+        remedy = "Make every surface of all scenes transparent with --alpha 0.33, or name other scenes."
+        if {entry.held_out for entry in kept} != {entry.held_out for entry in entries}:
+            raise Problem(why, remedy)
+        runner.progress.skipped("opaque scenes", len(opaque))
+        runner.progress.note(f"{why} Left out. {remedy}")
+    return tuple(kept)
+
+
+def _require_views(scenes: Sequence[SceneEntry], views: Sequence[RenderedView]) -> None:
+    seen = {view.scene.held_out for view in views}
+    for held_out, purpose in ((False, "train on"), (True, "evaluate on")):
+        names = ", ".join(scene.label for scene in scenes if scene.held_out == held_out)
+        if names and held_out not in seen:
+            raise Problem(
+                f"No view of {names} shows a transparent surface, so there is nothing to {purpose}.",
+                "Give views with --views, choose --holdout otherwise, or add scenes.",
+                ExitCode.CHECK_FAILED,
+            )

@@ -1,0 +1,136 @@
+"""What the pipeline asks for and who does it: a task is an artifact's address, and a runner makes what is missing.
+
+The pipeline (`services.pipeline`) is the same on a laptop and on a cluster; a runner is what differs. Only addresses
+and small facts pass between them, everything else goes through the store.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+from pydantic import BaseModel, ConfigDict
+
+from services.progress import Progress
+from services.store import Address, Store
+
+if TYPE_CHECKING:
+    from services.measured import Measured
+    from services.registry import Registry
+    from services.storage import Blobs
+
+Role = Literal["jobs", "render", "label", "train"]
+ROLES: tuple[Role, ...] = ("jobs", "render", "label", "train")
+
+StageName = Literal["scene", "render", "label", "train", "export", "evaluate", "report"]
+
+STAGE_ROLE: Mapping[str, Role] = {
+    "scene": "render",
+    "render": "render",
+    "label": "label",
+    "train": "train",
+    "export": "train",
+    "evaluate": "render",
+    "report": "render",
+}
+"""Which kind of worker a stage needs: `render` has OpenGL and USD, `label` numba, `train` torch and OpenGL."""
+
+FACTS = "facts.json"
+"""File of every artifact with what the pipeline has to know of it: small, JSON."""
+
+
+class Source(BaseModel):
+    """Files that a task reads and that are not artifacts: a scene or a published bundle.
+
+    Attributes:
+        digest: Content hash that names it.
+        root: File of a scene that is opened; relative to the folder.
+        folder: Local folder where the files lie already; None: they are blobs.
+        files: Relative path -> hex sha256 of its blob.
+        trusted: Whether it is a local user's own; a file that came over the network is opened with limits.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    digest: str
+    root: str = ""
+    folder: str | None = None
+    files: dict[str, str] = {}
+    trusted: bool = False
+
+
+class Task(BaseModel):
+    """One artifact to make.
+
+    Attributes:
+        name: What a user calls it, unique in its stage: `bottles front`.
+        stage: Stage of the address.
+        version: Code version of the address.
+        inputs: Inputs of the address.
+        params: Parameters of the address.
+        needs: Artifacts that are read, as `stage/key`.
+        scene: The scene, where the stage reads it.
+        bundle: The published bundle, where the stage renders one that is no artifact.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str
+    stage: StageName
+    version: str
+    inputs: tuple[str, ...] = ()
+    params: dict[str, Any] = {}
+    needs: tuple[str, ...] = ()
+    scene: Source | None = None
+    bundle: Source | None = None
+
+    @property
+    def address(self) -> Address:
+        """Where the artifact is, or will be."""
+        return Address(self.stage, self.version, self.inputs, self.params)
+
+    @property
+    def artifact(self) -> str:
+        """`stage/key`, as in another task's `needs`."""
+        return f"{self.stage}/{self.address.key}"
+
+    @property
+    def role(self) -> Role:
+        """Which kind of worker does it."""
+        return STAGE_ROLE[self.stage]
+
+
+Report = Callable[[float, str], None]
+"""How a stage's body tells how far it is: the fraction done, and how it goes."""
+
+Facts = dict[str, Any]
+
+
+class Runner(Protocol):
+    """Makes artifacts.
+
+    Attributes:
+        progress: Where notes and counts of skipped work go.
+        store: Where artifacts lie.
+        blobs: Where files lie that are asked for by hash.
+        registry: Where bundles are published.
+        measured: Where measurements and data sets are kept.
+        job_id: Of the job, None outside the service.
+    """
+
+    progress: Progress
+    store: Store
+    blobs: Blobs
+    registry: Registry
+    measured: Measured
+    job_id: str | None
+
+    def map(self, stage: StageName, tasks: Sequence[Task]) -> list[Facts | None]:
+        """Makes what is missing of a stage's artifacts.
+
+        Returns:
+            The facts of each artifact, in the order of the tasks; None for a task that failed to the end.
+        """
+
+    def step(self, name: str, body: Callable[[], Any]) -> Any:
+        """Runs something idempotent beside the artifacts (publishing, recording), and remembers its JSON result."""

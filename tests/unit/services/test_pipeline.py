@@ -1,0 +1,160 @@
+"""The order of the stages, and what becomes of what fails, over a runner that answers from a table."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from support.runner import TableRunner, scene
+
+from schemas.job import JobSpec
+from schemas.problem import Problem
+from services import pipeline
+from services.pipeline import JobContext, run_job
+
+SCENES = {record.id: record for record in (scene(1, "bottles"), scene(2, "knots"), scene(3, "town"))}
+JOB = JobContext(id="job_0", created="2026-01-01T00:00:00+00:00")
+
+
+def spec(kind: str = "build", **changes: Any) -> JobSpec:
+    uses = [{"scene": key, "holdout": record.name == "town"} for key, record in SCENES.items()]
+    return JobSpec.model_validate(
+        {"kind": kind, "name": "glass", "scenes": uses, "width": 16, "height": 16, "budgets": [1.0], **changes}
+    )
+
+
+def run(runner: TableRunner, wanted: JobSpec) -> dict[str, Any]:
+    return run_job(wanted, SCENES, runner, JOB)  # type: ignore[arg-type]
+
+
+def test_a_build_goes_through_every_stage_once_and_publishes_what_it_measured() -> None:
+    runner = TableRunner()
+    result = run(runner, spec())
+    assert runner.stages() == ["scene", "render", "label", "train", "export", "evaluate", "report"]
+    assert [len(runner.of(stage)) for stage in runner.stages()] == [3, 6, 6, 1, 1, 4, 1]
+    assert result["reference"] == "glass@1.0.0"
+    assert result["score"] == pytest.approx(0.5), "1e-5 of the bundle over 2e-5 of VKB"
+    assert result["per_scene"] == {"town": {"score": pytest.approx(0.5), "rival": None}}
+    (published,) = runner.published
+    assert published["job_id"] == "job_0"
+    assert published["artifacts"][0] == runner.of("export")[0].artifact
+    assert {need.partition("/")[0] for need in published["artifacts"][1:]} == {"train", "label"}
+
+
+def test_held_out_views_are_not_trained_on() -> None:
+    runner = TableRunner()
+    run(runner, spec())
+    (train,) = runner.of("train")
+    held_out = {task.artifact for task in runner.of("label") if task.name.startswith("town")}
+    assert len(train.needs) == 4
+    assert not held_out & set(train.needs)
+    assert {shard.scene for shard in runner.shards} == {"bottles", "knots"}
+    assert {task.name.split()[0] for task in runner.of("evaluate")} == {"town"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "stages"),
+    [
+        ("render", ["scene", "render"]),
+        ("label", ["scene", "render", "label"]),
+        ("train", ["scene", "render", "label", "train", "export"]),
+        ("evaluate", ["scene", "render", "label", "evaluate"]),
+    ],
+)
+def test_a_part_of_the_job_ends_where_its_kind_says(kind: str, stages: list[str]) -> None:
+    champion = SimpleNamespace(name="glass", version="1.0.0", digest="c" * 64, files={})
+    runner = TableRunner(champion)
+    result = run(runner, spec(kind, **({"model": "glass"} if kind == "evaluate" else {})))
+    assert runner.stages() == stages
+    if kind == "train":
+        assert runner.published[0]["score"] is None
+        assert runner.considered == [(None, None, False)], "what was not measured is never promoted"
+    if kind == "evaluate":
+        assert result["score"] == pytest.approx(1.5)
+        assert set(result["per_scene"]) == {"bottles", "knots", "town"}
+
+
+def test_a_view_that_fails_to_the_end_is_left_out_and_the_rest_goes_on() -> None:
+    runner = TableRunner(
+        fails=[("render", "knots view1"), ("label", "bottles view0"), ("evaluate", "town view0 bundle")]
+    )
+    run(runner, spec())
+    assert len(runner.of("label")) == 5
+    assert len(runner.of("train")[0].needs) == 2, "knots view0 and bottles view1"
+    assert [count for _, count, model in runner.recorded if model] == [1], "the view with both pictures"
+
+
+def test_a_stage_that_fails_everywhere_ends_the_job_with_what_to_do() -> None:
+    runner = TableRunner(fails=[("train", "glass")])
+    with pytest.raises(Problem, match="train failed for its 1 task") as caught:
+        run(runner, spec())
+    assert "retry" in caught.value.remedy
+
+
+def test_views_without_fragments_and_opaque_scenes_are_skipped_and_counted() -> None:
+    runner = TableRunner()
+    runner.empty = {"knots view0"}
+    runner.opaque = {"bottles"}
+    run(runner, spec())
+    assert runner.progress.skips["opaque scenes"] == 1
+    assert runner.progress.skips["views without a transparent pixel"] == 1
+    assert [task.name for task in runner.of("label")] == ["knots view1", "town view0", "town view1"]
+
+
+def test_nothing_transparent_to_train_on_is_a_problem() -> None:
+    runner = TableRunner()
+    runner.empty = {f"{name} view{i}" for name in ("bottles", "knots") for i in range(2)}
+    with pytest.raises(Problem, match="nothing to train on"):
+        run(runner, spec())
+
+
+def _champion(trained_on: str, monkeypatch: pytest.MonkeyPatch) -> Any:
+    provenance = SimpleNamespace(scenes={"some": trained_on})
+    monkeypatch.setattr(pipeline, "load_manifest", lambda folder: SimpleNamespace(provenance=provenance))
+    return SimpleNamespace(name="glass", version="1.0.0", digest="c" * 64, files={})
+
+
+def test_the_champion_is_measured_on_the_same_views(monkeypatch: pytest.MonkeyPatch) -> None:
+    runner = TableRunner(_champion("9" * 64, monkeypatch))
+    result = run(runner, spec())
+    assert len(runner.of("evaluate")) == 6
+    assert result["rival_score"] == pytest.approx(1.5)
+    assert runner.considered == [(pytest.approx(0.5), pytest.approx(1.5), True)]
+
+
+def test_a_champion_that_was_trained_on_a_held_out_scene_is_not_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    town = next(record for record in SCENES.values() if record.name == "town")
+    runner = TableRunner(_champion(town.digest, monkeypatch))
+    assert run(runner, spec())["rival_score"] is None
+    assert runner.considered == [(pytest.approx(0.5), None, True)]
+
+
+def test_fine_tuning_is_another_training_than_one_from_scratch(monkeypatch: pytest.MonkeyPatch) -> None:
+    champion = _champion("9" * 64, monkeypatch)
+    scratch, tuned = TableRunner(champion), TableRunner(champion)
+    run(scratch, spec())
+    run(tuned, spec(start_from="champion", promote="never"))
+    assert scratch.of("train")[0].bundle is None
+    assert tuned.of("train")[0].bundle is not None
+    assert scratch.of("train")[0].artifact != tuned.of("train")[0].artifact
+    assert tuned.considered[0][2] is False
+
+
+def test_a_data_set_is_trained_on_with_the_settings_it_was_made_with() -> None:
+    runner = TableRunner()
+    wanted = JobSpec(kind="train", name="glass", dataset="dst_" + "0" * 32, seed=7)
+    run_job(wanted, {}, runner, JOB)  # type: ignore[arg-type]
+    assert runner.stages() == ["train", "export"]
+    assert runner.of("train")[0].needs == ("label/abc",)
+    assert runner.of("export")[0].params["settings"]["size"] == [32, 16]
+    assert runner.of("train")[0].params["seed"] == 7
+
+
+def test_what_does_not_change_a_picture_does_not_change_its_address() -> None:
+    one, other = TableRunner(), TableRunner()
+    run(one, spec())
+    run(other, spec(budgets=[1.0, 2.0], steps=7, name="other"))
+    for stage in ("scene", "render"):
+        assert [task.artifact for task in one.of(stage)] == [task.artifact for task in other.of(stage)]
+    assert one.of("label")[0].artifact != other.of("label")[0].artifact
