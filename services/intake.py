@@ -1,0 +1,171 @@
+"""What an uploaded scene is: passed by the gate, opened, counted, read. Runs in a sandboxed child process."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pxr import Ar, Sdf, Tf, Usd, UsdGeom
+
+from renderer.convert import stage_file
+from renderer.gate import RejectedScene
+from renderer.gate.check import CheckedUpload, check_upload
+from renderer.gate.problems import shown
+from renderer.scene import load_scene
+from renderer.usd.stage import WarningLog, open_stage, stage_time, usd_diagnostics
+from schemas.limits import LIMITS
+from schemas.problem import ExitCode, Problem
+
+WARNINGS = 50
+"""Most warnings that are kept."""
+WARNING_LENGTH = 200
+"""Most characters of one."""
+GPRIM_POINTS = 600
+"""About as many points as an implicit gprim is tessellated to."""
+
+
+def inspect(folder: Path, root: str, cache: Path | None = None) -> dict[str, Any]:
+    """Reads an uploaded scene from end to end.
+
+    Args:
+        folder: Holds the upload's files and nothing else.
+        root: Relative name of the file that is the scene.
+        cache: Where a .glb is converted to; None: the folder for temporary files.
+
+    Returns:
+        `triangles`, `points`, `prims`, `layers`, `cameras`, `opaque` and `warnings`.
+
+    Raises:
+        RejectedScene: It is not accepted. Nothing in the message is a file's content.
+    """
+    folder = folder.resolve()
+    # Layers are looked for in the upload only, whatever the environment says.
+    Ar.DefaultResolver.SetDefaultSearchPath([])
+    try:
+        checked = check_upload(folder, root)
+        stage_path = stage_file(folder, root, cache or Path(tempfile.gettempdir()))
+        home = folder if stage_path.is_relative_to(folder) else stage_path.parent
+        counts = _count(stage_path, home, root)
+        scene = load_scene(stage_path)
+    except RejectedScene:
+        raise
+    except MemoryError as error:
+        raise RejectedScene("scene-too-large", f"{shown(root)} needs more memory than a scene may use.") from error
+    except Problem as problem:
+        raise _rejection(problem, root) from problem
+    except (OSError, Tf.ErrorException, ArithmeticError, LookupError, RuntimeError, TypeError, ValueError) as error:
+        raise RejectedScene("scene-damaged", f"{shown(root)} cannot be read.") from error
+    return {
+        "triangles": scene.triangles,
+        "points": counts.points,
+        "prims": counts.prims,
+        "layers": counts.layers,
+        "cameras": len(scene.cameras),
+        "opaque": scene.is_opaque,
+        "warnings": _warnings(scene.warnings, home, checked),
+    }
+
+
+@dataclass
+class _Counts:
+    """What is counted of a stage.
+
+    Attributes:
+        prims: Composed prims, instance proxies included.
+        points: Of everything that can be drawn, with instances.
+        layers: Layers that the stage uses.
+    """
+
+    prims: int = 0
+    points: int = 0
+    layers: int = 0
+    _of_prototype: dict[Sdf.Path, int] = field(default_factory=dict)
+
+
+def _count(path: Path, home: Path, root: str) -> _Counts:
+    """Opens the stage, and stops as soon as a budget is exceeded."""
+    counts = _Counts()
+    with usd_diagnostics(WarningLog()):
+        stage = open_stage(path)
+        counts.layers = _check_layers(stage, home)
+        time = stage_time(stage, None)
+        for prim in stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)):
+            counts.prims += 1
+            if counts.prims > LIMITS.prims:
+                raise RejectedScene("scene-too-large", f"{shown(root)} has more than {LIMITS.prims} prims.")
+            counts.points += _points(prim, time, counts, ())
+            if counts.points > LIMITS.points:
+                raise RejectedScene("scene-too-large", f"{shown(root)} has more than {LIMITS.points} points.")
+    return counts
+
+
+def _check_layers(stage: Usd.Stage, home: Path) -> int:
+    """How many layers the stage uses; all of them lie in the upload."""
+    used = 0
+    for layer in stage.GetUsedLayers():
+        if layer.anonymous:
+            continue
+        used += 1
+        real = layer.realPath or Ar.SplitPackageRelativePathOuter(layer.identifier)[0]
+        if not Path(real.split("[", 1)[0]).resolve().is_relative_to(home):
+            raise RejectedScene("scene-path-outside", "The scene uses a layer outside the upload.")
+    if used > LIMITS.layers:
+        raise RejectedScene("scene-too-many-layers", f"The scene uses {used} layers, more than {LIMITS.layers}.")
+    return used
+
+
+def _points(prim: Usd.Prim, time: Usd.TimeCode, counts: _Counts, parents: tuple[Sdf.Path, ...]) -> int:
+    """Points of a gprim, or of all that a point instancer makes."""
+    if prim.IsA(UsdGeom.PointInstancer):
+        return _instanced_points(UsdGeom.PointInstancer(prim), time, counts, parents)
+    if not prim.IsA(UsdGeom.Gprim):
+        return 0
+    path = (prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim).GetPath()
+    if path not in counts._of_prototype:
+        values = UsdGeom.PointBased(prim).GetPointsAttr().Get(time) if prim.IsA(UsdGeom.PointBased) else None
+        found = GPRIM_POINTS if not prim.IsA(UsdGeom.PointBased) else 0 if values is None else len(values)
+        counts._of_prototype[path] = found
+    return counts._of_prototype[path]
+
+
+def _instanced_points(
+    instancer: UsdGeom.PointInstancer, time: Usd.TimeCode, counts: _Counts, parents: tuple[Sdf.Path, ...]
+) -> int:
+    path = instancer.GetPath()
+    indices = instancer.GetProtoIndicesAttr().Get(time)
+    if path in parents or indices is None:
+        return 0
+    stage = instancer.GetPrim().GetStage()
+    sizes = []
+    for target in instancer.GetPrototypesRel().GetForwardedTargets():
+        prototype = stage.GetPrimAtPath(target)
+        below = _under(prototype) if prototype else iter(())
+        sizes.append(sum(_points(prim, time, counts, (*parents, path)) for prim in below))
+    return sum(sizes[index] for index in indices if 0 <= index < len(sizes))
+
+
+def _under(prim: Usd.Prim) -> Iterator[Usd.Prim]:
+    return iter(Usd.PrimRange(prim, Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)))
+
+
+def _rejection(problem: Problem, root: str) -> RejectedScene:
+    """A problem of reading, without the paths and quotations that are right for a local user's own files."""
+    if problem.code == ExitCode.LIMIT:
+        return RejectedScene("scene-too-large", f"{shown(root)} has too many triangles or copies.", problem.remedy)
+    if "no geometry" in problem.title:
+        return RejectedScene("scene-no-geometry", f"{shown(root)} has no geometry that can be drawn.")
+    return RejectedScene("scene-damaged", f"{shown(root)} cannot be read, or has coordinates that are not finite.")
+
+
+def _warnings(lines: tuple[str, ...], home: Path, checked: CheckedUpload) -> list[str]:
+    """Warnings with names in the upload only; what USD itself says is only counted, as it quotes files."""
+    own = [line for line in lines if not line.startswith("USD says")]
+    found = [line.replace(f"{home}/", "")[:WARNING_LENGTH] for line in own[:WARNINGS]]
+    if len(own) < len(lines):
+        found.append("USD found composition errors; usdchecker lists them")
+    if checked.missing:
+        found.append(f"{checked.missing} files that are named are not in the upload")
+    return found
