@@ -1,0 +1,142 @@
+"""`diaphane serve`: the whole service in one process: API, registry, dashboard, and workers of every role."""
+
+from __future__ import annotations
+
+import ipaddress
+import os
+import sys
+import threading
+import time
+from contextlib import suppress
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from schemas.problem import ExitCode, Problem
+from services.cli.state import DEFAULT_STATE, STATE_VARIABLE, StateOption
+
+if TYPE_CHECKING:
+    from services.service import Service
+
+DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 8035
+FIRST_KEY = "first"
+
+
+def serve(
+    host: Annotated[str, typer.Option("--host", help="Address to listen on.")] = DEFAULT_HOST,
+    port: Annotated[int, typer.Option("--port", help="Port; 0: a free one.", min=0, max=65535)] = DEFAULT_PORT,
+    roles: Annotated[
+        str, typer.Option("--roles", help="What it does itself, of jobs,render,label,train; 'none': the API only.")
+    ] = "jobs,render,label,train",
+    state: StateOption = DEFAULT_STATE,
+) -> None:
+    """Serve the API, and do the work. Stop with Ctrl-C: what is under way continues at the next start."""
+    from services.cli.worker import parse_roles, shut_down, stop_on_signal
+
+    wanted = () if roles.strip() == "none" else parse_roles(roles)
+    os.environ[STATE_VARIABLE] = str(state)
+    from services import logs
+    from services.engine.runtime import Parts, Runtime
+    from services.service import open_service
+    from services.settings import Settings
+
+    logs.set_up()
+    settings = Settings()
+    service = open_service(settings)
+    show_first_key(service, host)
+    parts = Parts(service.storage, service.registry, service.measured, service.scenes)
+    runtime = Runtime(settings, wanted, parts=parts) if wanted else None
+    stop = threading.Event()
+    stop_on_signal(stop.set)
+    listener = _Listener(service, host, port)
+    try:
+        listener.start()
+        if runtime is not None:
+            runtime.start()
+        listener.wait_ready()
+        announce(host, listener.port)
+        while not stop.wait(0.5) and listener.is_alive():
+            pass
+    finally:
+        listener.stop()
+        if runtime is not None:
+            shut_down(runtime)
+    if not stop.is_set():
+        raise Problem("The HTTP server ended by itself.", "Look into the log, and start it again.", ExitCode.TRY_AGAIN)
+
+
+class _Listener(threading.Thread):
+    """The HTTP server, in a thread: signals belong to the main one."""
+
+    def __init__(self, service: Service, host: str, port: int) -> None:
+        super().__init__(daemon=True, name="http")
+        from services.api.server import make_server
+
+        names = [name.strip() for name in service.settings.hosts.split(",") if name.strip()]
+        self._server = make_server(service, host, port, names)
+        self._where = host, port
+
+    @property
+    def port(self) -> int:
+        """That it listens on."""
+        return int(self._server.servers[0].sockets[0].getsockname()[1])
+
+    def run(self) -> None:
+        with suppress(SystemExit):  # uvicorn's way to say that it cannot listen
+            self._server.run()
+
+    def wait_ready(self) -> None:
+        """Waits until it listens.
+
+        Raises:
+            Problem: It cannot.
+        """
+        while not self._server.started:
+            if not self.is_alive():
+                host, port = self._where
+                raise Problem(
+                    f"The service cannot listen on {host}, port {port}.",
+                    "Is another one running there? Choose another port with --port.",
+                    ExitCode.CONFLICT,
+                )
+            time.sleep(0.02)
+
+    def stop(self) -> None:
+        """Ends it, after the requests under way."""
+        self._server.should_exit = True
+        if self.is_alive():
+            self.join(10.0)
+
+
+def show_first_key(service: Service, host: str) -> None:
+    """Makes the first key of a new service and prints it; it is never shown again.
+
+    Raises:
+        Problem: There is no key, and others than this machine could reach the service.
+    """
+    if service.keys.any():
+        return
+    if not is_loopback(host):
+        raise Problem(
+            f"The service has no API key yet, and {host} can be reached from elsewhere.",
+            "Make a key with `diaphane keys create` on this machine, or start it once on 127.0.0.1.",
+            ExitCode.AUTH,
+        )
+    _, secret = service.keys.create(FIRST_KEY, ("admin",))
+    print(f"First API key (admin), shown only now:\n  {secret}\nUse it: export DIAPHANE_KEY={secret}", flush=True)
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach an address."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def announce(host: str, port: int) -> None:
+    """Prints where the service is."""
+    shown = f"[{host}]" if ":" in host else host
+    print(f"Diaphane serves http://{shown}:{port}", file=sys.stdout, flush=True)
