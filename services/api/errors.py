@@ -1,0 +1,96 @@
+"""Every error as `application/problem+json`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Awaitable, Callable, Sequence
+from typing import Any
+
+import structlog
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import Response
+from sqlalchemy.exc import DBAPIError, InterfaceError, OperationalError
+from sqlalchemy.exc import TimeoutError as PoolTimeoutError
+from starlette.exceptions import HTTPException
+
+from schemas.problem import Problem
+from services.api.routes import methods_of
+from services.problems import MEDIA_TYPE, Refusal, refusal_of
+
+_ERRORS = 20
+_LENGTH = 200
+_RETRY_SECONDS = "2"
+_OF_STATUS = {
+    400: "malformed",
+    401: "unauthenticated",
+    403: "forbidden",
+    404: "not-found",
+    409: "conflict",
+    413: "too-large",
+    415: "unsupported-media-type",
+    416: "range-not-satisfiable",
+    422: "invalid",
+    503: "unavailable",
+}
+
+log = structlog.get_logger("diaphane.api")
+
+
+def answer(refusal: Refusal, scope: Any) -> Response:
+    """The response to a request that is refused."""
+    request_id = scope.get("state", {}).get("request_id", "")
+    document = refusal.document(instance=str(scope.get("path", ""))[:_LENGTH], request_id=request_id)
+    # ASCII only: the path may hold what cannot be encoded.
+    content = json.dumps(document.model_dump(mode="json"), ensure_ascii=True).encode()
+    headers = dict(refusal.headers)
+    if refusal.type.status == 503:
+        headers.setdefault("Retry-After", _RETRY_SECONDS)
+    return Response(content, refusal.type.status, headers, media_type=MEDIA_TYPE)
+
+
+def refusal_for(error: Exception) -> Refusal | None:
+    """What an error means for the client; None: it is a fault of the service."""
+    if isinstance(error, Refusal):
+        return error
+    if isinstance(error, Problem):
+        return refusal_of(error)
+    if isinstance(error, RequestValidationError):
+        return _invalid(error.errors())
+    if isinstance(error, (OperationalError, InterfaceError, PoolTimeoutError)) or (
+        isinstance(error, DBAPIError) and error.connection_invalidated
+    ):
+        log.warning("database away", error=type(error).__name__)
+        return Refusal("unavailable", "The database cannot be reached.")
+    if isinstance(error, HTTPException) and error.status_code in _OF_STATUS:
+        return Refusal(_OF_STATUS[error.status_code], headers=error.headers)
+    return None
+
+
+def install(app: FastAPI) -> None:
+    """Makes every error of the application a problem document."""
+
+    async def handle(request: Request, error: Exception) -> Response:
+        if isinstance(error, HTTPException) and error.status_code == 405:
+            allowed = ", ".join(methods_of(request.scope["path"]))
+            return answer(Refusal("method-not-allowed", headers={"Allow": allowed}), request.scope)
+        refusal = refusal_for(error)
+        if refusal is None:
+            raise error  # the outermost layer logs it and answers 500
+        return answer(refusal, request.scope)
+
+    handler: Callable[[Request, Exception], Awaitable[Response]] = handle
+    for kind in (HTTPException, RequestValidationError, Refusal, Problem, DBAPIError, PoolTimeoutError):
+        app.add_exception_handler(kind, handler)
+
+
+def _invalid(errors: Sequence[Any]) -> Refusal:
+    """Only places and rules, never what was sent."""
+    places = [
+        {"at": ".".join(str(part) for part in error["loc"])[:_LENGTH], "message": str(error["msg"])[:_LENGTH]}
+        for error in errors[:_ERRORS]
+    ]
+    if errors and all(error["loc"][:1] == ("path",) for error in errors):
+        return Refusal("not-found", "The address names nothing: an id in it is not of the right form.")
+    first = places[0] if places else {"at": "", "message": ""}
+    return Refusal("invalid", f"{first['at']}: {first['message']}"[:_LENGTH], errors=places)
