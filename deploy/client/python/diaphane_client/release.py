@@ -1,0 +1,187 @@
+"""A published version as the server describes it, believed only as far as its signature goes.
+
+Rules:
+- the statement is the exact text that is signed; what the record says beside it must be the same;
+- the digest follows from the names and hashes of the files;
+- names of files are plain, so that none leads out of the bundle's folder.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
+from diaphane_client.errors import Refused
+
+STATEMENT_FORMAT: Final = "diaphane-release/1"
+BUNDLE_FORMAT: Final = "diaphane-bundle/1"
+MANIFEST: Final = "manifest.json"
+
+MAX_RECORD_BYTES: Final = 1 << 20
+MAX_MANIFEST_BYTES: Final = 1 << 20
+MAX_FILE_BYTES: Final = 64 << 20
+MAX_FILES: Final = 16
+
+_FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
+_SHA256 = re.compile(r"[0-9a-f]{64}")
+_VERSION = re.compile(r"(\d{1,6})\.(\d{1,6})\.(\d{1,6})")
+
+_SERVED_WRONG = "Ask who runs the server: it may be misconfigured, or somebody may have tampered with it."
+
+
+@dataclass(frozen=True)
+class FileRef:
+    """A file of a bundle."""
+
+    sha256: str
+    bytes: int
+
+
+@dataclass(frozen=True)
+class Release:
+    """A published version.
+
+    Attributes:
+        name: Name of the bundle.
+        version: Semantic version.
+        digest: Hex sha256 over the names and hashes of the files.
+        files: Name -> size and hash.
+        statement: The text that is signed.
+        signature: ed25519 over the statement's UTF-8 bytes, base64.
+        public_key: Raw ed25519 public key, base64.
+    """
+
+    name: str
+    version: str
+    digest: str
+    files: Mapping[str, FileRef]
+    statement: str
+    signature: str
+    public_key: str
+
+    @property
+    def order(self) -> tuple[int, ...]:
+        """The version as numbers, to compare."""
+        return version_order(self.version)
+
+    def as_json(self) -> dict[str, Any]:
+        """What `parse` reads back."""
+        files = {name: {"sha256": file.sha256, "bytes": file.bytes} for name, file in self.files.items()}
+        return {**self.__dict__, "files": files}
+
+
+def version_order(version: str) -> tuple[int, ...]:
+    """A semantic version as numbers; empty if it is none."""
+    found = _VERSION.fullmatch(version)
+    return tuple(map(int, found.groups())) if found else ()
+
+
+def parse(content: bytes) -> Release:
+    """Reads a version's record. Nothing in it is believed before `verify`.
+
+    Raises:
+        Refused: It is not a record.
+    """
+    try:
+        record = json.loads(content)
+        texts = {name: record[name] for name in ("name", "version", "digest", "statement", "signature", "public_key")}
+        if not all(isinstance(text, str) for text in texts.values()):
+            raise TypeError("a text is not one")
+        release = Release(**texts, files=_files(record["files"]))
+        if MANIFEST not in release.files:
+            raise ValueError("there is no manifest")
+        return release
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise Refused(
+            "The server's answer is not the record of a version.", "Check the URL; it is that of a Diaphane server."
+        ) from error
+
+
+def verify(release: Release, name: str, selector: str, trusted: Collection[str]) -> None:
+    """Checks that a release is what was asked for, and signed with a trusted key.
+
+    Args:
+        release: As the server describes it.
+        name: Name that was asked for.
+        selector: Version or alias that was asked for.
+        trusted: Public keys, base64.
+
+    Raises:
+        Refused: It is not.
+    """
+    if release.public_key not in trusted:
+        raise Refused(
+            f"'{name}' is signed with the key {release.public_key}, which is not the one that is trusted here.",
+            "If the server's key was changed on purpose, give the new one as public_key once.",
+        )
+    if not _is_signed(release):
+        raise Refused(f"The signature of '{name}' {release.version} is wrong.", _SERVED_WRONG)
+    statement = json.loads(release.statement)
+    described = {path: {"sha256": file.sha256, "bytes": file.bytes} for path, file in release.files.items()}
+    signed: dict[str, object] = {"format": STATEMENT_FORMAT, "name": name, "version": release.version}
+    signed |= {"digest": release.digest, "files": described}
+    if not isinstance(statement, dict) or any(statement.get(field) != value for field, value in signed.items()):
+        raise Refused(f"The record of '{name}' does not say what its signature is for.", _SERVED_WRONG)
+    if release.name != name or release.digest != _digest(release.files):
+        raise Refused(f"The record of '{name}' contradicts itself.", _SERVED_WRONG)
+    if version_order(selector) and release.version != selector:
+        raise Refused(f"The server has {release.version} for '{name}' {selector}.", _SERVED_WRONG)
+
+
+def check_manifest(content: bytes, release: Release) -> None:
+    """Checks that a bundle's manifest lists the files that the release has.
+
+    Raises:
+        Refused: It does not.
+    """
+    try:
+        manifest = json.loads(content)
+        fits = manifest["format"] == BUNDLE_FORMAT and {
+            **_files(manifest["files"]),
+            MANIFEST: release.files[MANIFEST],
+        } == dict(release.files)
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        fits = False
+    if not fits:
+        raise Refused(
+            f"The manifest of '{release.name}' {release.version} does not list the files that it is published with.",
+            "Update diaphane-client; if that does not help, publish the bundle again.",
+        )
+
+
+def _files(listed: Mapping[str, Mapping[str, Any]]) -> dict[str, FileRef]:
+    files = {}
+    for name, file in listed.items():
+        sha256, size = file["sha256"], file["bytes"]
+        limit = MAX_MANIFEST_BYTES if name == MANIFEST else MAX_FILE_BYTES
+        if not _FILE_NAME.fullmatch(name) or not _SHA256.fullmatch(sha256):
+            raise ValueError("a file has no proper name or hash")
+        if type(size) is not int or not 0 <= size <= limit:
+            raise ValueError("a file has no proper size")
+        files[name] = FileRef(sha256, size)
+    if not 0 < len(files) <= MAX_FILES:
+        raise ValueError("there are no files, or too many")
+    return files
+
+
+def _digest(files: Mapping[str, FileRef]) -> str:
+    hashes = {name: file.sha256 for name, file in files.items()}
+    return hashlib.sha256(json.dumps(hashes, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+def _is_signed(release: Release) -> bool:
+    try:
+        key = Ed25519PublicKey.from_public_bytes(base64.b64decode(release.public_key, validate=True))
+        key.verify(base64.b64decode(release.signature, validate=True), release.statement.encode())
+        json.loads(release.statement)
+    except (InvalidSignature, ValueError, RecursionError):
+        return False
+    return True

@@ -1,0 +1,168 @@
+"""What is asked of the server: a version's record, and files by hash, which go on where they were cut."""
+
+from __future__ import annotations
+
+import ssl
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Self
+
+import httpx
+
+from diaphane_client.errors import Denied, NotFound, PullError, Refused, Unavailable
+from diaphane_client.files import file_sha256
+from diaphane_client.release import MAX_RECORD_BYTES, FileRef
+
+ATTEMPTS = 6
+"""How often in a row a download may stop before the server is taken for unavailable."""
+FIRST_WAIT = 0.1
+"""Seconds before a stopped download goes on; doubled each time."""
+
+
+class Server:
+    """A Diaphane server.
+
+    Args:
+        url: Where it is, without `/v1`.
+        key: API key with the scope `read`; None: no key.
+        timeout: Seconds without a byte after which a connection is given up.
+    """
+
+    def __init__(self, url: str, key: str | None, timeout: float) -> None:
+        headers = {"Accept-Encoding": "identity"}
+        if key:
+            headers["Authorization"] = f"Bearer {key}"
+        # Redirects are not followed: the key is for this server only.
+        self._http = httpx.Client(
+            base_url=url.rstrip("/"), headers=headers, timeout=timeout, follow_redirects=False, verify=_certificates()
+        )
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._http.close()
+
+    def record(self, name: str, selector: str, etag: str) -> tuple[bytes, str] | None:
+        """The record of a version and its ETag; None if it is still the one with the given ETag.
+
+        Args:
+            name: Name of the bundle.
+            selector: Version or alias.
+            etag: ETag of an earlier answer, or empty.
+
+        Raises:
+            PullError: There is no such version, or the server cannot or will not tell.
+        """
+        headers = {"If-None-Match": etag} if etag else {}
+        with _reported(), self._http.stream("GET", f"/v1/models/{name}/versions/{selector}", headers=headers) as answer:
+            if answer.status_code == httpx.codes.NOT_MODIFIED and etag:
+                return None
+            _check_status(answer, f"'{name}' {selector}")
+            content = b""
+            for chunk in answer.iter_raw():
+                content += chunk
+                if len(content) > MAX_RECORD_BYTES:
+                    raise Refused("The server's record of the version is too long.", "Check the URL.")
+            return content, answer.headers.get("ETag", "")
+
+    def download(self, file: FileRef, part: Path) -> None:
+        """Downloads a file by its hash.
+
+        Args:
+            file: Size and hash.
+            part: Where to; what is there from an earlier attempt is not downloaded again.
+
+        Raises:
+            Refused: The server's bytes do not have that hash.
+            PullError: The server cannot be reached, or does not have the file.
+            OSError: The disk cannot be written.
+        """
+        resumed = part.exists() and part.stat().st_size > 0
+        self._complete(file, part)
+        if file_sha256(part) == file.sha256:
+            return
+        part.unlink()
+        if resumed:  # what was there before may be what is wrong
+            self._complete(file, part)
+            if file_sha256(part) == file.sha256:
+                return
+            part.unlink()
+        raise Refused(
+            f"The server's bytes for {file.sha256} do not have that hash.",
+            "Try again; if it stays so, the server or the way to it is damaged or tampered with.",
+        )
+
+    def _complete(self, file: FileRef, part: Path) -> None:
+        """Appends to a part until it has its size; attempts that add nothing are counted."""
+        part.touch()
+        failures = 0
+        while (start := part.stat().st_size) != file.bytes:
+            if start > file.bytes:
+                part.unlink()
+                part.touch()
+                start = 0
+            try:
+                self._append(file, part, start)
+                stopped: PullError = Unavailable("The server ended a download early.", "Try again.")
+            except Unavailable as error:
+                stopped = error
+            if part.stat().st_size > start:
+                failures = 0
+                continue
+            failures += 1
+            if failures >= ATTEMPTS:
+                raise stopped
+            time.sleep(FIRST_WAIT * 2.0 ** (failures - 1))
+
+    def _append(self, file: FileRef, part: Path, start: int) -> None:
+        headers = {"Range": f"bytes={start}-"} if start else {}
+        with _reported(), self._http.stream("GET", f"/v1/blobs/sha256/{file.sha256}", headers=headers) as answer:
+            _check_status(answer, f"the file {file.sha256}")
+            goes_on = answer.headers.get("Content-Range", "").startswith(f"bytes {start}-")
+            if start and answer.status_code == httpx.codes.PARTIAL_CONTENT and not goes_on:
+                raise Refused("The server sent another part of a file than was asked for.", "Try again.")
+            if answer.status_code == httpx.codes.OK:
+                start = 0  # the server knows no ranges
+            with part.open("r+b") as stream:
+                stream.truncate(start)
+                stream.seek(start)
+                for chunk in answer.iter_raw():
+                    start += len(chunk)
+                    if start > file.bytes:
+                        raise Refused("The server sent more of a file than it has.", "Try again.")
+                    stream.write(chunk)
+
+
+@cache
+def _certificates() -> ssl.SSLContext:
+    """The trusted authorities: read once, since that takes longer than asking whether there is a new version."""
+    return httpx.create_ssl_context()
+
+
+@contextmanager
+def _reported() -> Iterator[None]:
+    try:
+        yield
+    except httpx.InvalidURL as error:
+        raise NotFound(f"The URL is not understood ({error}).", "Give it like https://diaphane.example.") from error
+    except httpx.HTTPError as error:
+        raise Unavailable(
+            f"The server cannot be reached ({type(error).__name__}).", "Check the URL and the network, and try again."
+        ) from error
+
+
+def _check_status(answer: httpx.Response, what: str) -> None:
+    status = answer.status_code
+    if status in (httpx.codes.OK, httpx.codes.PARTIAL_CONTENT):
+        return
+    if status in (httpx.codes.UNAUTHORIZED, httpx.codes.FORBIDDEN):
+        raise Denied(f"The server does not let this key read {what}.", "Give a key with the scope `read`.")
+    if status == httpx.codes.NOT_FOUND:
+        raise NotFound(f"The server does not have {what}.", "Look at `diaphane models list` for what it has.")
+    if status == httpx.codes.TOO_MANY_REQUESTS or status >= httpx.codes.INTERNAL_SERVER_ERROR:
+        raise Unavailable(f"The server cannot answer now (status {status}).", "Try again later.")
+    raise Refused(f"The server answered with status {status} when asked for {what}.", "Check the URL.")

@@ -1,0 +1,449 @@
+"""The client: whatever the server or the network does, a bundle is whole and genuine, or the old one stays."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import random
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from support.bundles import make_bundle
+from support.release_server import KEY, ReleaseServer
+
+from diaphane_client import Denied, NotFound, PullError, Refused, Unavailable, cached, pull
+from diaphane_client import server as client_server
+from schemas.bundle import FILES, MANIFEST
+from schemas.service import FileRef
+from services.registry import Signer
+from services.registry.names import bundle_files, digest_of
+from services.registry.signing import statement
+
+CLIENT = Path(__file__).parents[3] / "deploy" / "client" / "python"
+SIGNER = Signer(lambda: b"s" * 32)
+STRANGER = Signer(lambda: b"x" * 32)
+
+Record = dict[str, Any]
+
+
+@pytest.fixture
+def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[ReleaseServer]:
+    monkeypatch.setattr(client_server, "FIRST_WAIT", 0.001)
+    found = ReleaseServer()
+    yield found
+    found.stop()
+
+
+def record_of(version: str, files: dict[str, FileRef], signer: Signer = SIGNER, name: str = "glass") -> Record:
+    text = statement(name, version, digest_of(files), "2026-01-01T00:00:00Z", files)
+    return {
+        "name": name,
+        "version": version,
+        "digest": digest_of(files),
+        "files": {file: reference.model_dump() for file, reference in files.items()},
+        "statement": text,
+        "signature": signer.sign(text),
+        "public_key": signer.public_key,
+        "score": 0.5,
+        "aliases": ["champion"],
+    }
+
+
+def publish(
+    server: ReleaseServer, tmp_path: Path, version: str, *, signer: Signer = SIGNER, alias: str = "champion"
+) -> Record:
+    """Serves a bundle under a version and an alias."""
+    bundle = make_bundle(tmp_path / f"published-{version}-{len(server.blobs)}", f"{version} " + "w" * 5000)
+    files = bundle_files(bundle)
+    server.blobs |= {files[name].sha256: (bundle / name).read_bytes() for name in files}
+    record = record_of(version, files, signer)
+    serve(server, record, alias)
+    return record
+
+
+def serve(server: ReleaseServer, record: Record, alias: str = "champion") -> None:
+    for selector in (alias, record["version"]):
+        server.records[f"glass/versions/{selector}"] = json.dumps(record).encode()
+
+
+def fetch(server: ReleaseServer, tmp_path: Path, alias: str = "champion", **options: Any) -> Path:
+    return pull("glass", alias, url=server.url, key=KEY, folder=tmp_path / "bundles", **options)
+
+
+def visible(tmp_path: Path) -> list[str]:
+    """Versions that a reader of the folder sees, after a check that each is whole."""
+    versions = sorted((tmp_path / "bundles" / "glass" / "versions").glob("*"))
+    for folder in versions:
+        assert {path.name for path in folder.iterdir()} == {MANIFEST, *FILES}
+        for name, file in json.loads((folder / MANIFEST).read_bytes())["files"].items():
+            assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == file["sha256"]
+    return [folder.name for folder in versions]
+
+
+def test_a_bundle_is_fetched_whole_and_found_again_by_its_etag(server: ReleaseServer, tmp_path: Path) -> None:
+    publish(server, tmp_path, "1.0.0")
+    folder = fetch(server, tmp_path)
+    assert folder == tmp_path / "bundles" / "glass" / "versions" / "1.0.0"
+    assert visible(tmp_path) == ["1.0.0"]
+    assert (folder / FILES[0]).read_text().startswith(f"{FILES[0]} 1.0.0")
+    before = len(server.blob_requests())
+    assert fetch(server, tmp_path) == folder
+    assert server.requests[-1][1]["If-None-Match"]
+    assert len(server.blob_requests()) == before
+    assert not (tmp_path / "bundles" / "glass" / "parts").exists()
+
+
+def test_a_new_version_replaces_the_old_one_which_stays_readable(server: ReleaseServer, tmp_path: Path) -> None:
+    publish(server, tmp_path, "1.9.0")
+    old = fetch(server, tmp_path)
+    publish(server, tmp_path, "1.10.0")
+    assert fetch(server, tmp_path).name == "1.10.0"
+    assert visible(tmp_path) == ["1.10.0", "1.9.0"]
+    assert old.is_dir()
+    assert fetch(server, tmp_path, "1.9.0") == old
+
+
+def test_files_that_were_damaged_here_are_fetched_again(server: ReleaseServer, tmp_path: Path) -> None:
+    publish(server, tmp_path, "1.0.0")
+    folder = fetch(server, tmp_path)
+    for damage in (lambda: (folder / FILES[0]).write_text("x"), lambda: (folder / FILES[1]).unlink()):
+        damage()
+        assert cached("glass", url=server.url, folder=tmp_path / "bundles") is None
+        assert fetch(server, tmp_path) == folder
+        assert visible(tmp_path) == ["1.0.0"]
+
+
+def _other_signature(record: Record) -> Record:
+    return {**record, "signature": STRANGER.sign(record["statement"])}
+
+
+def _no_signature(record: Record) -> Record:
+    return {**record, "signature": ""}
+
+
+def _other_key(record: Record) -> Record:
+    files = {name: FileRef(**file) for name, file in record["files"].items()}
+    return record_of(record["version"], files, STRANGER)
+
+
+def _higher_version(record: Record) -> Record:
+    return {**record, "version": "9.0.0"}
+
+
+def _higher_version_in_the_statement(record: Record) -> Record:
+    return {**record, "version": "9.0.0", "statement": record["statement"].replace("1.1.0", "9.0.0")}
+
+
+def _file_swapped(record: Record) -> Record:
+    files = {**record["files"], FILES[0]: {"sha256": "0" * 64, "bytes": 3}}
+    return {**record, "files": files}
+
+
+def _file_added(record: Record) -> Record:
+    return {**record, "files": {**record["files"], "evil.glsl": {"sha256": "0" * 64, "bytes": 3}}}
+
+
+def _file_left_out(record: Record) -> Record:
+    return {**record, "files": {name: file for name, file in record["files"].items() if name != FILES[0]}}
+
+
+def _other_digest(record: Record) -> Record:
+    return {**record, "digest": "0" * 64}
+
+
+def _other_digest_signed(record: Record) -> Record:
+    text = record["statement"].replace(record["digest"], "0" * 64)
+    return {**record, "digest": "0" * 64, "statement": text, "signature": SIGNER.sign(text)}
+
+
+def _other_name(record: Record) -> Record:
+    files = {name: FileRef(**file) for name, file in record["files"].items()}
+    return record_of(record["version"], files, name="crystal")
+
+
+def _path_for_a_name(record: Record) -> Record:
+    files = {name: FileRef(**file) for name, file in record["files"].items()}
+    return record_of(record["version"], {**files, "../../evil": FileRef(sha256="0" * 64, bytes=3)})
+
+
+def _without_manifest(record: Record) -> Record:
+    files = {name: FileRef(**file) for name, file in record["files"].items() if name != MANIFEST}
+    return record_of(record["version"], files)
+
+
+def _too_large(record: Record) -> Record:
+    files = {name: FileRef(**file) for name, file in record["files"].items()}
+    return record_of(record["version"], {**files, FILES[0]: FileRef(sha256="0" * 64, bytes=1 << 40)})
+
+
+def _no_record(record: Record) -> Record:
+    return {"detail": "hello"}
+
+
+TAMPERED: list[Callable[[Record], Record]] = [
+    _other_signature,
+    _no_signature,
+    _other_key,
+    _higher_version,
+    _higher_version_in_the_statement,
+    _file_swapped,
+    _file_added,
+    _file_left_out,
+    _other_digest,
+    _other_digest_signed,
+    _other_name,
+    _path_for_a_name,
+    _without_manifest,
+    _too_large,
+    _no_record,
+]
+
+
+@pytest.mark.parametrize("tamper", TAMPERED)
+def test_a_tampered_record_is_refused_and_the_old_bundle_stays(
+    tamper: Callable[[Record], Record], server: ReleaseServer, tmp_path: Path
+) -> None:
+    publish(server, tmp_path, "1.0.0")
+    folder = fetch(server, tmp_path)
+    before = len(server.blob_requests())
+    server.records["glass/versions/champion"] = json.dumps(tamper(publish(server, tmp_path, "1.1.0"))).encode()
+    with pytest.raises(Refused):
+        fetch(server, tmp_path)
+    assert len(server.blob_requests()) == before
+    assert visible(tmp_path) == ["1.0.0"]
+    assert cached("glass", url=server.url, folder=tmp_path / "bundles") == folder
+
+
+@pytest.mark.parametrize("name", [MANIFEST, *FILES])
+def test_a_tampered_file_is_refused_and_the_old_bundle_stays(name: str, server: ReleaseServer, tmp_path: Path) -> None:
+    publish(server, tmp_path, "1.0.0")
+    folder = fetch(server, tmp_path)
+    record = publish(server, tmp_path, "1.1.0")
+    sha256 = record["files"][name]["sha256"]
+    genuine = server.blobs[sha256]
+    for tampered in (b"?" + genuine[1:], genuine + b"?"):
+        server.blobs[sha256] = tampered
+        with pytest.raises(Refused):
+            fetch(server, tmp_path)
+        assert visible(tmp_path) == ["1.0.0"]
+        assert cached("glass", url=server.url, folder=tmp_path / "bundles") == folder
+    server.blobs[sha256] = genuine
+    assert fetch(server, tmp_path).name == "1.1.0"
+
+
+def test_a_manifest_that_lists_other_files_is_refused_though_it_is_signed(
+    server: ReleaseServer, tmp_path: Path
+) -> None:
+    bundle = make_bundle(tmp_path / "bundle")
+    manifest = json.loads((bundle / MANIFEST).read_text())
+    for change in ({"format": "other/1"}, {"files": {}}, {"files": {**manifest["files"], FILES[0]: {}}}):
+        (bundle / MANIFEST).write_text(json.dumps({**manifest, **change}))
+        files = bundle_files(bundle)
+        server.blobs |= {files[name].sha256: (bundle / name).read_bytes() for name in files}
+        serve(server, record_of("1.0.0", files))
+        with pytest.raises(Refused, match="does not list the files"):
+            fetch(server, tmp_path)
+    assert visible(tmp_path) == []
+
+
+def test_a_lower_version_is_refused_unless_it_was_asked_for(server: ReleaseServer, tmp_path: Path) -> None:
+    old = publish(server, tmp_path, "1.9.0")
+    publish(server, tmp_path, "1.10.0")
+    folder = fetch(server, tmp_path)
+    serve(server, old)
+    with pytest.raises(Refused, match="allow_rollback=True"):
+        fetch(server, tmp_path)
+    assert cached("glass", url=server.url, folder=tmp_path / "bundles") == folder
+    assert fetch(server, tmp_path, allow_rollback=True).name == "1.9.0"
+    assert fetch(server, tmp_path).name == "1.9.0"
+
+
+def test_the_same_version_with_other_files_is_refused(server: ReleaseServer, tmp_path: Path) -> None:
+    publish(server, tmp_path, "1.0.0")
+    fetch(server, tmp_path)
+    bundle = make_bundle(tmp_path / "other", "other")
+    serve(server, record_of("1.0.0", bundle_files(bundle)))
+    with pytest.raises(Refused, match="Versions never change"):
+        fetch(server, tmp_path)
+
+
+def test_a_version_that_was_asked_for_is_that_version(server: ReleaseServer, tmp_path: Path) -> None:
+    record = publish(server, tmp_path, "1.0.0")
+    server.records["glass/versions/1.1.0"] = json.dumps(record).encode()
+    with pytest.raises(Refused, match=r"1\.0\.0 for 'glass' 1\.1\.0"):
+        fetch(server, tmp_path, "1.1.0")
+
+
+def test_the_first_key_is_pinned_and_a_given_key_counts_from_the_first(server: ReleaseServer, tmp_path: Path) -> None:
+    publish(server, tmp_path, "1.0.0")
+    with pytest.raises(Refused, match="not the one that is trusted"):
+        fetch(server, tmp_path, public_key=STRANGER.public_key)
+    fetch(server, tmp_path)
+    assert json.loads((tmp_path / "bundles" / "known-keys.json").read_text()) == {server.url: SIGNER.public_key}
+    publish(server, tmp_path, "1.1.0", signer=STRANGER)
+    with pytest.raises(Refused, match="give the new one as public_key"):
+        fetch(server, tmp_path)
+    assert fetch(server, tmp_path, public_key=STRANGER.public_key).name == "1.1.0"
+    assert fetch(server, tmp_path).name == "1.1.0"
+
+
+def test_damaged_pins_are_not_taken_for_no_pins(server: ReleaseServer, tmp_path: Path) -> None:
+    publish(server, tmp_path, "1.0.0")
+    fetch(server, tmp_path)
+    (tmp_path / "bundles" / "known-keys.json").write_text("{")
+    with pytest.raises(PullError, match="Restore that file"):
+        fetch(server, tmp_path)
+
+
+def test_a_cache_that_was_tampered_with_is_not_used(server: ReleaseServer, tmp_path: Path) -> None:
+    publish(server, tmp_path, "1.0.0")
+    fetch(server, tmp_path)
+    pointer = tmp_path / "bundles" / "glass" / "aliases" / "champion.json"
+    genuine = pointer.read_text()
+    server.stop()
+    for tampered in ("{", "[]", genuine.replace("1.0.0", "1.0.1"), genuine.replace(SIGNER.public_key, "AAAA")):
+        pointer.write_text(tampered)
+        assert cached("glass", url=server.url, folder=tmp_path / "bundles") is None
+        with pytest.raises(Unavailable):
+            fetch(server, tmp_path)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("ranges", [True, False])
+def test_a_connection_cut_anywhere_never_shows_a_partial_bundle(
+    ranges: bool, seed: int, server: ReleaseServer, tmp_path: Path
+) -> None:
+    publish(server, tmp_path, "1.0.0")
+    old = fetch(server, tmp_path)
+    record = publish(server, tmp_path, "1.1.0")
+    drawn = random.Random(seed)
+    server.ranges = ranges
+    server.cuts = [drawn.randrange(5000) if drawn.random() < 0.7 else 0 for _ in range(40)]
+    for _ in range(60):
+        assert fetch(server, tmp_path) in (old, old.with_name("1.1.0"))
+        assert visible(tmp_path)[0] == "1.0.0"
+        if not server.cuts:
+            break
+    assert fetch(server, tmp_path).name == "1.1.0"
+    assert visible(tmp_path) == ["1.0.0", "1.1.0"]
+    assert record["version"] == "1.1.0"
+
+
+def test_a_cut_download_goes_on_where_it_stopped(server: ReleaseServer, tmp_path: Path) -> None:
+    record = publish(server, tmp_path, "1.0.0")
+    manifest_bytes = record["files"][MANIFEST]["bytes"]
+    server.cuts = [manifest_bytes, 1000, 2000]
+    fetch(server, tmp_path)
+    ranges = [headers["Range"] for headers in server.blob_requests() if "Range" in headers]
+    assert ranges == ["bytes=1000-", "bytes=3000-"]
+
+
+def test_a_download_goes_on_in_the_next_process(server: ReleaseServer, tmp_path: Path) -> None:
+    record = publish(server, tmp_path, "1.0.0")
+    server.cuts = [record["files"][MANIFEST]["bytes"], 1000, *([0] * client_server.ATTEMPTS)]
+    with pytest.raises(Unavailable):
+        fetch(server, tmp_path)
+    assert visible(tmp_path) == []
+    assert fetch(server, tmp_path).name == "1.0.0"
+    assert server.blob_requests()[-len(FILES)]["Range"] == "bytes=1000-"
+
+
+def test_a_damaged_part_of_an_earlier_attempt_is_fetched_anew(server: ReleaseServer, tmp_path: Path) -> None:
+    record = publish(server, tmp_path, "1.0.0")
+    parts = tmp_path / "bundles" / "glass" / "parts"
+    parts.mkdir(parents=True)
+    (parts / record["files"][FILES[0]]["sha256"]).write_bytes(b"?" * 100)
+    (parts / record["files"][FILES[1]]["sha256"]).write_bytes(b"?" * 100_000)
+    assert fetch(server, tmp_path).name == "1.0.0"
+
+
+def test_a_server_that_is_down_does_not_take_the_bundle_away(
+    server: ReleaseServer, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    publish(server, tmp_path, "1.0.0")
+    folder = fetch(server, tmp_path)
+    for status in (500, 503, 429):
+        server.status = status
+        assert fetch(server, tmp_path) == folder
+    server.stop()
+    assert fetch(server, tmp_path) == folder
+    assert "Using 'glass' 1.0.0 of an earlier pull" in caplog.text
+    with pytest.raises(Unavailable):
+        fetch(server, tmp_path, "candidate")
+    server.status = None
+    server.start()
+    assert fetch(server, tmp_path) == folder
+
+
+def test_refusals_of_the_server_say_what_to_do(server: ReleaseServer, tmp_path: Path) -> None:
+    publish(server, tmp_path, "1.0.0")
+    with pytest.raises(NotFound, match="diaphane models list"):
+        fetch(server, tmp_path, "candidate")
+    with pytest.raises(Denied, match="scope `read`"):
+        pull("glass", url=server.url, key=None, folder=tmp_path / "bundles")
+    for status in (301, 418):
+        server.status = status
+        with pytest.raises(Refused, match=f"status {status}"):
+            fetch(server, tmp_path)
+    for name, alias in (("../x", "champion"), ("glass", "../../keys"), ("glass", "a/b"), ("", "champion")):
+        with pytest.raises(NotFound, match="There can be no"):
+            pull(name, alias, url=server.url, key=KEY, folder=tmp_path / "bundles")
+
+
+def test_a_record_without_end_is_not_read_to_its_end(server: ReleaseServer, tmp_path: Path) -> None:
+    server.records["glass/versions/champion"] = b" " * (4 << 20)
+    with pytest.raises(Refused, match="too long"):
+        fetch(server, tmp_path)
+
+
+def test_a_full_disk_leaves_the_old_bundle(
+    server: ReleaseServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    publish(server, tmp_path, "1.0.0")
+    folder = fetch(server, tmp_path)
+    publish(server, tmp_path, "1.1.0")
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(OSError, match="No space left"):
+            fetch(server, tmp_path)
+    assert visible(tmp_path) == ["1.0.0"]
+    assert cached("glass", url=server.url, folder=tmp_path / "bundles") == folder
+    assert fetch(server, tmp_path).name == "1.1.0"
+
+
+def test_two_processes_that_pull_at_once_both_get_the_bundle(server: ReleaseServer, tmp_path: Path) -> None:
+    publish(server, tmp_path, "1.0.0")
+    code = (
+        "import sys; from diaphane_client import pull; "
+        "print(pull('glass', url=sys.argv[1], key=sys.argv[2], folder=sys.argv[3]))"
+    )
+    command = [sys.executable, "-c", code, server.url, KEY, str(tmp_path / "bundles")]
+    processes = [
+        subprocess.Popen(command, cwd=CLIENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        for _ in range(2)
+    ]
+    for process in processes:
+        out, err = process.communicate(timeout=60)
+        assert process.returncode == 0, err
+        assert Path(out.strip()).name == "1.0.0"
+    assert visible(tmp_path) == ["1.0.0"]
+
+
+def test_the_client_needs_nothing_of_the_service(tmp_path: Path) -> None:
+    shutil.copytree(CLIENT / "diaphane_client", tmp_path / "diaphane_client")
+    code = (
+        "import sys, diaphane_client; "
+        "print({'schemas', 'renderer', 'labeller', 'trainer', 'services', 'numpy', 'pydantic'} & set(sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=True, capture_output=True, text=True)
+    assert done.stdout == "set()\n"
