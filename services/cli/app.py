@@ -18,7 +18,22 @@ import typer
 from typer.exceptions import Abort, Exit, TyperException
 
 from schemas.problem import ExitCode, Problem
-from services.cli import build, models, output, samples
+from services.cli import (
+    build,
+    datasets,
+    health,
+    jobs,
+    keys,
+    measurements,
+    models,
+    output,
+    retrain,
+    samples,
+    scenes,
+    serve,
+    worker,
+    workers,
+)
 from services.cli.state import DEFAULT_STATE, STATE_VARIABLE
 
 app = typer.Typer(
@@ -30,7 +45,17 @@ app = typer.Typer(
 )
 app.command("build")(build.build)
 app.command("samples")(samples.samples)
+app.command("serve")(serve.serve)
+app.command("worker")(worker.worker)
+app.command("retrain")(retrain.retrain)
+app.add_typer(scenes.app, name="scenes")
+app.add_typer(jobs.app, name="jobs")
+app.add_typer(datasets.app, name="datasets")
+app.command("measurements")(measurements.measurements)
 app.add_typer(models.app, name="models")
+app.add_typer(keys.app, name="keys")
+app.command("workers")(workers.workers)
+app.command("health")(health.health)
 
 
 @app.command("version")

@@ -1,40 +1,75 @@
-"""`diaphane models`: what the registry holds."""
+"""`diaphane models`: what the registry holds, that of the state folder or that of a server."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 import typer
 
+from schemas.problem import ExitCode, Problem
 from services.cli import output
+from services.cli.lines import plain
+from services.cli.server import URL_VARIABLE, KeyFileOption, connect
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
 
 if TYPE_CHECKING:
+    from services.cli.remote import Remote
     from services.registry import Publication, Registry
 
-app = typer.Typer(help="Published bundles: list, show, promote.", no_args_is_help=True)
+app = typer.Typer(help="Published bundles: list, show, promote, roll back.", no_args_is_help=True)
 
 NameArgument = Annotated[str, typer.Argument(help="Name of the bundle.")]
+ReasonOption = Annotated[str, typer.Option("--reason", help="Why; kept in the history.")]
+AliasOption = Annotated[str, typer.Option("--alias", help="The alias that moves.")]
+ServerOption = Annotated[
+    str | None, typer.Option("--url", envvar=URL_VARIABLE, help="A server's registry, not that of the state folder.")
+]
+CHAMPION = "champion"
+
+
+class Models(Protocol):
+    """A registry, here or on a server; answers are those of the REST interface (`schemas.service`)."""
+
+    def models(self) -> Sequence[dict[str, Any]]:
+        """All names."""
+
+    def versions(self, name: str) -> Sequence[dict[str, Any]]:
+        """All versions of a name, oldest first."""
+
+    def version(self, name: str, selector: str) -> dict[str, Any]:
+        """A version by number or alias."""
+
+    def aliases(self, name: str) -> dict[str, Any]:
+        """Aliases and their history, oldest move first."""
+
+    def move_alias(self, name: str, alias: str, version: str, reason: str) -> None:
+        """Points an alias at a version."""
+
+    def roll_back(self, name: str, alias: str, reason: str) -> None:
+        """Points an alias at the version that it meant before."""
 
 
 @app.command("list")
-def list_(state: StateOption = DEFAULT_STATE, as_json: JsonOption = False) -> None:
+def list_(
+    state: StateOption = DEFAULT_STATE,
+    url: ServerOption = None,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
     """All bundles, with their latest version and their champion."""
-    registry = _registry(state)
-    entries = [
-        {
-            "name": name,
-            "latest": registry.versions(name)[-1].version,
-            "champion": registry.aliases(name).aliases.get("champion"),
-        }
-        for name in registry.names()
-    ]
+    with closing(_open(state, url, key_file)) as registry:
+        entries = [
+            {"name": model["name"], "latest": model["latest"], "champion": model["aliases"].get(CHAMPION)}
+            for model in registry.models()
+        ]
     if as_json:
         output.print_json({"bundles": entries})
         return
     if not entries:
-        output.err().print(f"No bundle is published in {registry.root} yet: `diaphane build` publishes one.")
+        output.err().print("No bundle is published yet: `diaphane build` publishes one.")
     for entry in entries:
         print(f"{entry['name']}  latest {entry['latest']}  champion {entry['champion'] or 'none'}")
 
@@ -43,47 +78,149 @@ def list_(state: StateOption = DEFAULT_STATE, as_json: JsonOption = False) -> No
 def show(
     reference: Annotated[str, typer.Argument(help="NAME, NAME@VERSION or NAME@ALIAS.")],
     state: StateOption = DEFAULT_STATE,
+    url: ServerOption = None,
+    key_file: KeyFileOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Versions of a bundle with scores and digests, and the moves of its aliases; or one version of it."""
-    registry = _registry(state)
-    chosen = registry.resolve(reference) if "@" in reference else None
-    name = reference.partition("@")[0]
-    publications = [chosen] if chosen else registry.versions(name)
-    if not publications:
-        registry.resolve(name)  # raises the Problem for an unknown name
-    aliases = registry.aliases(name)
+    name, at, selector = reference.partition("@")
+    with closing(_open(state, url, key_file)) as registry:
+        versions = [registry.version(name, selector or CHAMPION)] if at else registry.versions(name)
+        if not versions:
+            raise Problem(f"There is no bundle '{plain(name)}'.", "See `diaphane models list`.", ExitCode.NOT_FOUND)
+        meaning = registry.aliases(name)
     if as_json:
-        versions = [_detail(registry, publication) for publication in publications]
-        output.print_json({"name": name, "versions": versions, **aliases.model_dump()})
+        output.print_json({"name": name, "versions": versions, **meaning})
         return
-    for publication in publications:
-        marks = [alias for alias, version in aliases.aliases.items() if version == publication.version]
-        score = "none" if publication.score is None else f"{publication.score:.4g}"
-        print(f"{name}@{publication.version}  score {score}  {publication.created}  {', '.join(marks)}".rstrip())
-        print(f"  sha256 {publication.digest}\n  {registry.folder(publication)}")
-    for move in aliases.history:
-        print(f"{move.when}  {move.alias}: {move.before or 'none'} -> {move.after}  by {move.who}: {move.why}")
+    for version in versions:
+        marks = [alias for alias, number in meaning["aliases"].items() if number == version["version"]]
+        score = "none" if version["score"] is None else f"{version['score']:.4g}"
+        print(f"{name}@{version['version']}  score {score}  {version['created']}  {', '.join(marks)}".rstrip())
+        print(f"  sha256 {version['digest']}")
+        if "folder" in version:
+            print(f"  {version['folder']}")
+    for move in meaning["history"]:
+        who, why = plain(move["who"]), plain(move["why"])
+        print(f"{move['at']}  {move['alias']}: {move['before'] or 'none'} -> {move['after']}  by {who}: {why}")
 
 
 @app.command()
 def promote(
     name: NameArgument,
     version: Annotated[str, typer.Argument(help="Version that becomes the champion.")],
-    reason: Annotated[str, typer.Option("--reason", help="Why; kept in the history.")],
+    reason: ReasonOption,
+    alias: AliasOption = CHAMPION,
     state: StateOption = DEFAULT_STATE,
+    url: ServerOption = None,
+    key_file: KeyFileOption = None,
 ) -> None:
     """Make a version the champion."""
-    _registry(state).promote(name, version, reason)
-    print(f"{name}@{version} is the champion.")
+    with closing(_open(state, url, key_file)) as registry:
+        registry.move_alias(name, alias, version, reason)
+        _say(registry, name, alias)
 
 
-def _registry(state: Path) -> Registry:
-    # Imported late: `diaphane --help` does not need pydantic.
-    from services.registry import Registry
+@app.command()
+def rollback(
+    name: NameArgument,
+    reason: ReasonOption,
+    alias: AliasOption = CHAMPION,
+    state: StateOption = DEFAULT_STATE,
+    url: ServerOption = None,
+    key_file: KeyFileOption = None,
+) -> None:
+    """Make the version before the champion again."""
+    with closing(_open(state, url, key_file)) as registry:
+        registry.roll_back(name, alias, reason)
+        _say(registry, name, alias)
 
-    return Registry(state / "registry")
+
+def _say(registry: Models, name: str, alias: str) -> None:
+    version = registry.version(name, alias)["version"]
+    print(f"{name}@{version} is the {alias}.")
 
 
-def _detail(registry: Registry, publication: Publication) -> dict[str, Any]:
-    return {**publication.model_dump(), "folder": str(registry.folder(publication))}
+def _open(state: Path, url: str | None, key_file: Path | None) -> _Local | _Server:
+    return _Local(state) if url is None else _Server(connect(url, key_file))
+
+
+class _Local:
+    """The registry of a state folder.
+
+    Args:
+        state: The folder.
+    """
+
+    def __init__(self, state: Path) -> None:
+        # Imported late: `diaphane --help` needs no database.
+        from services.database import open_database
+        from services.registry import open_registry
+        from services.settings import Settings
+        from services.storage import open_storage
+
+        # As in `diaphane build`: a local registry is that of its folder, whatever the environment names.
+        settings = Settings(state=state, database="", store="", cache="")
+        self._database = open_database(settings.database_url)
+        self._registry: Registry = open_registry(self._database, open_storage(settings).blobs, settings)
+
+    def close(self) -> None:
+        self._database.close()
+
+    def models(self) -> list[dict[str, Any]]:
+        return [model.model_dump(mode="json") for model in self._registry.models()]
+
+    def versions(self, name: str) -> list[dict[str, Any]]:
+        return [self._detail(publication) for publication in self._registry.versions(name)]
+
+    def version(self, name: str, selector: str) -> dict[str, Any]:
+        return self._detail(self._registry.resolve(f"{name}@{selector}"))
+
+    def aliases(self, name: str) -> dict[str, Any]:
+        history = [move.model_dump(mode="json") for move in self._registry.moves(name)]
+        return {"aliases": self._registry.aliases(name).aliases, "history": history}
+
+    def move_alias(self, name: str, alias: str, version: str, reason: str) -> None:
+        self._registry.promote(name, version, reason, alias)
+
+    def roll_back(self, name: str, alias: str, reason: str) -> None:
+        self._registry.rollback(name, reason, alias)
+
+    def _detail(self, publication: Publication) -> dict[str, Any]:
+        return {**publication.model_dump(mode="json"), "folder": str(self._registry.folder(publication))}
+
+
+class _Server:
+    """The registry of a server.
+
+    Args:
+        remote: The server.
+    """
+
+    def __init__(self, remote: Remote) -> None:
+        self._remote = remote
+
+    def close(self) -> None:
+        self._remote.transport.close()
+
+    def models(self) -> list[dict[str, Any]]:
+        return list(self._remote.models())
+
+    def versions(self, name: str) -> list[dict[str, Any]]:
+        return sorted(self._remote.versions(name), key=lambda version: _order(version["version"]))
+
+    def version(self, name: str, selector: str) -> dict[str, Any]:
+        return self._remote.version(name, selector)
+
+    def aliases(self, name: str) -> dict[str, Any]:
+        found = self._remote.aliases(name)
+        return {**found, "history": sorted(found["history"], key=lambda move: str(move["at"]))}
+
+    def move_alias(self, name: str, alias: str, version: str, reason: str) -> None:
+        self._remote.move_alias(name, alias, version, reason)
+
+    def roll_back(self, name: str, alias: str, reason: str) -> None:
+        self._remote.roll_back(name, alias, reason)
+
+
+def _order(version: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in version.split("."))

@@ -13,16 +13,20 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from support.bundles import make_bundle
 from support.measured import example
 
 import services
 from schemas.measurement import RegistryResult
 from schemas.problem import ExitCode, Problem
 from services.cli.app import run
+from services.database import open_database
 from services.options import BuildOptions
 from services.progress import Progress
-from services.registry import Registry
+from services.registry import open_registry
 from services.result import BuildResult
+from services.settings import Settings
+from services.storage import open_storage
 
 Build = Callable[[BuildOptions, Progress], BuildResult]
 
@@ -47,10 +51,10 @@ def pipeline(monkeypatch: pytest.MonkeyPatch) -> Callable[[Build], list[BuildOpt
             asked.append(options)
             return build(options, progress)
 
-        module = ModuleType("services.pipeline")
+        module = ModuleType("services.build")
         vars(module)["build"] = spy
-        monkeypatch.setitem(sys.modules, "services.pipeline", module)
-        monkeypatch.setattr(services, "pipeline", module, raising=False)
+        monkeypatch.setitem(sys.modules, "services.build", module)
+        monkeypatch.setattr(services, "build", module, raising=False)
         return asked
 
     return put
@@ -243,16 +247,16 @@ def test_version_names_the_libraries(capsys: pytest.CaptureFixture[str]) -> None
 
 
 def publish(folder: Path, weights: str, score: float | None) -> None:
-    bundle = folder / f"bundle-{weights}"
-    bundle.mkdir()
-    (bundle / "manifest.json").write_text(weights)
-    registry = Registry(folder / ".diaphane" / "registry")
-    publication = registry.publish("glass", bundle, score, {})
+    settings = Settings(state=folder / ".diaphane")
+    database = open_database(settings.database_url)
+    registry = open_registry(database, open_storage(settings).blobs, settings)
+    publication = registry.publish("glass", make_bundle(folder / f"bundle-{weights}", weights), score, {})
     champion = registry.champion("glass")
     registry.consider(publication, score, champion.score if champion else None)
+    database.close()
 
 
-def test_models_are_listed_shown_and_promoted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_models_are_listed_shown_promoted_and_rolled_back(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["models", "list"]) == ExitCode.OK
     assert "No bundle is published" in capsys.readouterr().err
     publish(folder, "a", 0.5)
@@ -272,17 +276,20 @@ def test_models_are_listed_shown_and_promoted(folder: Path, capsys: pytest.Captu
     (version,) = json.loads(capsys.readouterr().out)["versions"]
     assert version["score"] == 0.5
     assert Path(version["folder"]).is_dir()
+    assert run(["models", "rollback", "glass", "--reason", "flickers"]) == ExitCode.OK
+    assert capsys.readouterr().out == "glass@1.0.0 is the champion.\n"
+    assert run(["models", "rollback", "glass", "--reason", "flickers"]) == ExitCode.CONFLICT
 
 
 def test_a_real_interrupt_ends_with_130(tmp_path: Path) -> None:
     code = (
         "import sys, time, types, services\n"
-        "module = types.ModuleType('services.pipeline')\n"
+        "module = types.ModuleType('services.build')\n"
         "def build(options, progress):\n"
         "    with progress.stage('render', 9):\n"
         "        time.sleep(60)\n"
         "module.build = build\n"
-        "services.pipeline = sys.modules['services.pipeline'] = module\n"
+        "services.build = sys.modules['services.build'] = module\n"
         f"from services.cli import main; main({BUILD!r})\n"
     )
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

@@ -1,0 +1,151 @@
+"""The scenes that a job is made from: ids, or local files that are uploaded as far as the server lacks them."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from schemas.problem import ExitCode, Problem
+from services.cli.lines import plain
+from services.cli.packing import Package, pack
+from services.progress import Progress, make_progress
+
+if TYPE_CHECKING:
+    from services.cli.remote import Remote
+
+_ID = re.compile(r"scn_[0-9a-f]{32}")
+
+
+@dataclass(frozen=True, slots=True)
+class SceneInput:
+    """A scene as named on the command line.
+
+    Attributes:
+        reference: An id or the path of a file.
+        held_out: Whether it is evaluated on and never trained on.
+    """
+
+    reference: str
+    held_out: bool
+
+    @property
+    def is_id(self) -> bool:
+        """Whether the server has it already."""
+        return _ID.fullmatch(self.reference) is not None
+
+
+def named_scenes(scenes: Sequence[str], held_out: Sequence[str]) -> list[SceneInput]:
+    """All scenes in order; what is held out is among them by path, stem or id, or comes on top.
+
+    Raises:
+        Problem: A held-out entry is neither a file nor an id, or names several scenes by their stem.
+    """
+    found = dict.fromkeys(scenes, False)
+    for entry in held_out:
+        paths = [s for s in scenes if s == entry or Path(s).resolve() == Path(entry).resolve()]
+        matches = paths or [s for s in scenes if Path(s).stem == entry]
+        if len(matches) > 1:
+            raise Problem(f"The held-out scene {entry} names more than one of the scenes.", "Name it by its path.")
+        if not matches and not _ID.fullmatch(entry) and not Path(entry).is_file():
+            raise Problem(
+                f"The held-out scene {entry} is neither among the scenes nor a file.",
+                "Name it by its path, or by its id from `diaphane scenes list`.",
+                ExitCode.NOT_FOUND,
+            )
+        found[matches[0] if matches else entry] = True
+    return [SceneInput(reference, held) for reference, held in found.items()]
+
+
+def bring(remote: Remote, references: Sequence[str], *, silent: bool = False) -> list[dict[str, Any]]:
+    """Uploads what is new of local scenes, and waits until the server has checked everything.
+
+    Args:
+        remote: The server.
+        references: Ids, or paths of files.
+        silent: Whether no progress is shown.
+
+    Returns:
+        The scenes as the server knows them, in order.
+
+    Raises:
+        Problem: A file cannot be uploaded, a scene is rejected, or two are the same.
+    """
+    # Everything that can be wrong here is found before anything is sent.
+    packages = {r: pack(Path(r)) for r in references if not _ID.fullmatch(r)}
+    progress = make_progress(sys.stderr, silent=silent)
+    sent = upload(remote, list(packages.values()), progress)
+    ids = dict(zip(packages, (scene["id"] for scene in sent), strict=True))
+    scenes: list[dict[str, Any]] = []
+    for reference in references:
+        scene = remote.wait_for_scene(ids.get(reference, reference))
+        ensure_accepted(scene, reference)
+        twin = next((i for i, other in enumerate(scenes) if other["id"] == scene["id"]), None)
+        if twin is not None:
+            raise Problem(f"{references[twin]} and {reference} are the same scene.", "Name each scene once.")
+        scenes.append(scene)
+    return scenes
+
+
+def upload(remote: Remote, packages: Sequence[Package], progress: Progress) -> list[dict[str, Any]]:
+    """Uploads and registers scenes; says what they refer to and lack.
+
+    Returns:
+        The scenes, perhaps still being checked.
+    """
+    if not packages:
+        return []
+    scenes = []
+    with progress.stage("upload scenes", len(packages)) as stage:
+        for package in packages:
+            for name in package.missing:
+                progress.note(plain(f"{package.root} refers to {name}, which does not exist: it is left out."))
+            sent = 0
+
+            def advance(name: str, count: int) -> None:
+                nonlocal sent
+                sent += count
+                stage.advance(0, f"{name} {sent / 2**20:.1f} MiB")
+
+            scenes.append(remote.upload_scene(package, advance))
+            if not sent:
+                progress.skipped("scenes that the server had already")
+            stage.advance(1, package.name)
+    return scenes
+
+
+def ensure_accepted(scene: dict[str, Any], what: str) -> None:
+    """Raises the reason why a scene was rejected.
+
+    Raises:
+        Problem: It was.
+    """
+    if scene["state"] == "rejected":
+        problem = scene.get("problem") or {}
+        reason = plain(problem.get("detail") or problem.get("title") or "no reason was given.")
+        remedy = plain(problem.get("remedy") or "Change the scene.")
+        raise Problem(f"The server rejects {what}: {reason}", remedy, ExitCode.CHECK_FAILED)
+
+
+def scene_uses(
+    inputs: Sequence[SceneInput], scenes: Sequence[dict[str, Any]], views: Path | None = None
+) -> list[dict[str, Any]]:
+    """The scenes as a job lists them (`schemas.job.SceneUse`).
+
+    Args:
+        inputs: As named on the command line.
+        scenes: As the server knows them.
+        views: JSON file with views of the local ones.
+    """
+    uses = []
+    for given, scene in zip(inputs, scenes, strict=True):
+        use: dict[str, Any] = {"scene": scene["id"], "holdout": given.held_out}
+        if views is not None and not given.is_id:
+            from renderer.views import listed_views
+
+            use["views"] = [view.model_dump(mode="json") for view in listed_views(views, Path(given.reference))]
+        uses.append(use)
+    return uses

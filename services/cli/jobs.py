@@ -1,0 +1,161 @@
+"""`diaphane jobs`: work on a server."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from services.cli import output
+from services.cli.lines import percent, plain, print_columns, seconds
+from services.cli.server import DEFAULT_URL, KeyFileOption, LimitOption, UrlOption, connect
+from services.cli.state import JsonOption
+from services.cli.submit import submit
+
+app = typer.Typer(help="Jobs on a server: submit, watch, cancel, retry.", no_args_is_help=True)
+app.command("submit")(submit)
+
+JobArgument = Annotated[str, typer.Argument(metavar="ID", help="Id of the job.")]
+StateFilter = Annotated[str | None, typer.Option("--state", help="Only those in this state.")]
+StageFilter = Annotated[str | None, typer.Option("--stage", help="Only those of this stage.")]
+
+
+@app.command("list")
+def list_(
+    state: StateFilter = None,
+    kind: Annotated[str | None, typer.Option("--kind", help="Only those of this kind.")] = None,
+    name: Annotated[str | None, typer.Option("--name", help="Only those that publish under this name.")] = None,
+    limit: LimitOption = 50,
+    url: UrlOption = DEFAULT_URL,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Jobs, newest first."""
+    jobs = list(connect(url, key_file).jobs(limit, state=state, kind=kind, name=name))
+    if as_json:
+        output.print_json({"jobs": jobs})
+        return
+    print_columns(
+        ("id", "kind", "name", "state", "stage", "done", "to go", "created"),
+        [
+            (
+                job["id"],
+                job["kind"],
+                job["name"],
+                job["state"],
+                job["stage"],
+                percent(job["fraction"]),
+                seconds(job["eta_seconds"]),
+                job["created"],
+            )
+            for job in jobs
+        ],
+    )
+
+
+@app.command()
+def show(
+    job_id: JobArgument, url: UrlOption = DEFAULT_URL, key_file: KeyFileOption = None, as_json: JsonOption = False
+) -> None:
+    """A job: how far it is, what it made, why it failed."""
+    show_job(connect(url, key_file).job(job_id), as_json=as_json)
+
+
+@app.command()
+def watch(
+    job_id: JobArgument, url: UrlOption = DEFAULT_URL, key_file: KeyFileOption = None, as_json: JsonOption = False
+) -> None:
+    """Follow a job to its end; exit status 0 if it succeeded, 1 if it failed, 130 if it was cancelled."""
+    from services.cli.watching import ensure_success, follow
+
+    job = follow(connect(url, key_file), job_id, silent=as_json)
+    show_job(job, as_json=as_json)
+    ensure_success(job)
+
+
+@app.command()
+def cancel(
+    job_id: JobArgument, url: UrlOption = DEFAULT_URL, key_file: KeyFileOption = None, as_json: JsonOption = False
+) -> None:
+    """Stop a job; what it made until now is kept."""
+    _say(connect(url, key_file).cancel(job_id), as_json=as_json)
+
+
+@app.command()
+def retry(
+    job_id: JobArgument, url: UrlOption = DEFAULT_URL, key_file: KeyFileOption = None, as_json: JsonOption = False
+) -> None:
+    """Let a failed or cancelled job go on; what is made already is not made again."""
+    _say(connect(url, key_file).retry(job_id), as_json=as_json)
+
+
+@app.command()
+def tasks(
+    job_id: JobArgument,
+    stage: StageFilter = None,
+    state: StateFilter = None,
+    limit: LimitOption = 200,
+    url: UrlOption = DEFAULT_URL,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """The tasks of a job; a quarantined one with the reason."""
+    found = list(connect(url, key_file).tasks(job_id, limit, stage=stage, state=state))
+    if as_json:
+        output.print_json({"tasks": found})
+        return
+    rows = []
+    for task in found:
+        problem = task.get("problem") or {}
+        note = problem.get("detail") or problem.get("title") or task.get("note")
+        rows.append((task["stage"], task["name"], task["state"], seconds(task.get("seconds")), note))
+    print_columns(("stage", "task", "state", "took", "note"), rows)
+
+
+@app.command()
+def events(
+    job_id: JobArgument,
+    after: Annotated[int, typer.Option("--after", min=0, help="Only those after this number.")] = 0,
+    is_followed: Annotated[bool, typer.Option("--follow", help="Go on until the job ends.")] = False,
+    url: UrlOption = DEFAULT_URL,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """What happened in a job; with --json one object a line."""
+    import json
+
+    remote = connect(url, key_file)
+    for event in remote.events(job_id, after) if is_followed else remote.past_events(job_id, after):
+        if as_json:
+            print(json.dumps(event), flush=True)
+            continue
+        details = event["data"].items() if isinstance(event["data"], dict) else [("", event["data"])]
+        text = "  ".join(f"{name} {value}".strip() for name, value in details)
+        print(f"{event['number']:>5}  {event.get('at', '')}  {event['kind']:<5}  {plain(text)}", flush=True)
+
+
+def show_job(job: dict[str, Any], *, as_json: bool) -> None:
+    """Prints a job."""
+    if as_json:
+        output.print_json(job)
+        return
+    name = f"  {job['name']}" if job.get("name") else ""
+    print(f"{job['id']}  {job['kind']}{name}  {job['state']}  {percent(job['fraction'])}  attempt {job['attempt']}")
+    if problem := job.get("problem"):
+        print(f"  {plain(problem.get('detail') or problem['title'])}\n  {plain(problem.get('remedy', ''))}".rstrip())
+    if job.get("stages"):
+        columns = ("total", "done", "skipped", "running", "queued", "quarantined")
+        rows = [(s["stage"], *(s[c] for c in columns), seconds(s["eta_seconds"])) for s in job["stages"]]
+        print_columns(("stage", *columns, "to go"), rows)
+    if job.get("skipped"):
+        print("Skipped: " + ", ".join(f"{count} {plain(what)}" for what, count in job["skipped"].items()) + ".")
+    for name, value in (job.get("result") or {}).items():
+        if isinstance(value, str | int | float):
+            print(f"{plain(name)}: {plain(value)}")
+
+
+def _say(job: dict[str, Any], *, as_json: bool) -> None:
+    if as_json:
+        output.print_json(job)
+    else:
+        print(f"{job['id']}  {job['state']}")

@@ -1,0 +1,122 @@
+"""`diaphane keys`: who may use a server."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from schemas.problem import Problem
+from services.cli import output
+from services.cli.lines import print_columns
+from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption, connect
+from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
+
+if TYPE_CHECKING:
+    from services.keys import Keys
+
+app = typer.Typer(help="API keys: create, list, revoke. Needs an admin key, or --local.", no_args_is_help=True)
+
+LocalOption = Annotated[
+    bool, typer.Option("--local", help="Without a server: in the database of the state folder, or DIAPHANE_DATABASE.")
+]
+SCOPES = ("read", "submit", "publish", "admin")
+_DAY_SECONDS = 86400.0
+
+
+@app.command()
+def create(
+    name: Annotated[str, typer.Argument(help="Who or what it is for.")],
+    scope: Annotated[list[str], typer.Option("--scope", help="read, submit, publish or admin; repeatable.")],
+    days: Annotated[float | None, typer.Option("--days", help="Days until it expires. Default: never.")] = None,
+    is_local: LocalOption = False,
+    state: StateOption = DEFAULT_STATE,
+    url: UrlOption = DEFAULT_URL,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Make a key. It is printed once, on stdout, and cannot be shown again."""
+    unknown = sorted(set(scope) - set(SCOPES))
+    if unknown:
+        raise Problem(f"There is no scope '{unknown[0]}'.", f"Choose among {', '.join(SCOPES)}: --scope read.")
+    if days is not None and not 0.0 < days <= 36500.0:
+        raise Problem(f"--days {days:g} is not above 0 and at most 36500.", "Change that option.")
+    expires = None if days is None else time.time() + days * _DAY_SECONDS
+    if is_local:
+        with _local(state) as keys:
+            record, secret = keys.create(name, scope, expires)  # type: ignore[arg-type]  # checked above
+        made: dict[str, Any] = {"key": record.model_dump(mode="json"), "secret": secret}
+    else:
+        moment = None if expires is None else datetime.fromtimestamp(expires, UTC).isoformat(timespec="seconds")
+        made = connect(url, key_file).create_key(name, scope, moment)
+    if as_json:
+        output.print_json(made)
+        return
+    print(made["secret"])
+    output.err().print("Keep it: it is shown this once. Clients read it from DIAPHANE_KEY.", markup=False)
+
+
+@app.command("list")
+def list_(
+    is_local: LocalOption = False,
+    state: StateOption = DEFAULT_STATE,
+    url: UrlOption = DEFAULT_URL,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """All keys, without their secrets."""
+    if is_local:
+        with _local(state) as keys:
+            found = [key.model_dump(mode="json") for key in keys.list()]
+    else:
+        found = list(connect(url, key_file).keys())
+    if as_json:
+        output.print_json({"keys": found})
+        return
+    rows = [(k["id"], k["name"], ",".join(k["scopes"]), _state(k), k["created"], k["last_used"]) for k in found]
+    print_columns(("id", "name", "scopes", "state", "created", "last used"), rows)
+
+
+@app.command()
+def revoke(
+    key_id: Annotated[str, typer.Argument(metavar="ID", help="Id of the key: key_...")],
+    is_local: LocalOption = False,
+    state: StateOption = DEFAULT_STATE,
+    url: UrlOption = DEFAULT_URL,
+    key_file: KeyFileOption = None,
+) -> None:
+    """End a key at once."""
+    if is_local:
+        with _local(state) as keys:
+            keys.revoke(key_id)
+    else:
+        connect(url, key_file).revoke_key(key_id)
+    print(f"{key_id} is revoked.")
+
+
+@contextmanager
+def _local(state: Path) -> Iterator[Keys]:
+    # Imported late: `diaphane --help` needs no database.
+    from services.database import open_database
+    from services.keys import Keys
+    from services.settings import Settings
+
+    database = open_database(Settings(state=state).database_url)
+    try:
+        yield Keys(database)
+    finally:
+        database.close()
+
+
+def _state(key: dict[str, Any]) -> str:
+    if key["revoked"]:
+        return "revoked"
+    expires = key["expires"]
+    if expires and datetime.fromisoformat(expires) <= datetime.now(UTC):
+        return "expired"
+    return f"until {expires[:10]}" if expires else "valid"

@@ -1,0 +1,85 @@
+"""Which files a local scene consists of, for an upload: the root file and all it depends on, by relative name."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from schemas.problem import ExitCode, Problem
+
+_SINGLE = (".usdz", ".glb")
+_LAYERED = (".usd", ".usda", ".usdc")
+
+
+@dataclass(frozen=True, slots=True)
+class Package:
+    """A scene as it is uploaded.
+
+    Attributes:
+        name: What its owner calls it.
+        root: The file that is opened, by its name in `files`.
+        files: Relative name, with slashes -> local file.
+        missing: Names that the scene refers to and that do not exist.
+    """
+
+    name: str
+    root: str
+    files: dict[str, Path]
+    missing: tuple[str, ...] = ()
+
+
+def pack(path: Path, name: str | None = None) -> Package:
+    """The files of a scene.
+
+    Args:
+        path: The file that is opened: usd, usda, usdc, usdz or glb.
+        name: What it is called; None: the file's name without its suffix.
+
+    Raises:
+        Problem: There is no such file, or it is of another kind.
+    """
+    if not path.is_file():
+        what = f"{path} is a folder." if path.is_dir() else f"There is no file {path}."
+        raise Problem(what, "Name the file of the scene that is opened.", ExitCode.NOT_FOUND)
+    suffix = path.suffix.lower()
+    if suffix not in (*_SINGLE, *_LAYERED):
+        raise Problem(f"{path} is not a scene that can be uploaded.", f"Use {', '.join((*_LAYERED, *_SINGLE))}.")
+    name = name or path.stem
+    if suffix in _SINGLE:
+        return Package(name, path.name, {path.name: path})
+    files, missing = _dependencies(path)
+    root = path.resolve()
+    # Layers may refer upwards, as far as the upload reaches: the folder that holds all of them is its top.
+    top = Path(os.path.commonpath([root.parent, *(file.parent for file in files)]))
+    named = {file.relative_to(top).as_posix(): file for file in (root, *files)}
+    unnamed = tuple(sorted({Path(os.path.relpath(file, top)).as_posix() for file in missing}))
+    return Package(name, root.relative_to(top).as_posix(), named, unnamed)
+
+
+def _dependencies(path: Path) -> tuple[set[Path], set[Path]]:
+    """Files that the root layer depends on, and those of them that are missing."""
+    try:
+        from pxr import Tf, UsdUtils
+
+        from renderer.usd.materialx import referenced_files
+        from renderer.usd.stage import WarningLog, usd_diagnostics
+    except ImportError as error:
+        raise Problem(
+            f"What {path} consists of cannot be found out without OpenUSD.",
+            "Install usd-core, or pack the scene into one .usdz file.",
+        ) from error
+    root = path.resolve()
+    try:
+        with usd_diagnostics(WarningLog()):
+            layers, assets, unresolved = UsdUtils.ComputeAllDependencies(str(root))
+    except Tf.ErrorException as error:
+        raise Problem(f"{path} cannot be read as USD.", "Export it again.") from error
+    # A file inside a package (`x.usdz[y.png]`) is the package's.
+    names = [layer.realPath or layer.identifier for layer in layers] + [str(asset) for asset in assets]
+    files = [Path(str(name).split("[", 1)[0]) for name in (*names, *unresolved)]
+    files += [image for file in files if file.suffix.lower() == ".mtlx" for image in referenced_files(file)]
+    # Names are made by the path as written: a link keeps its name, and is sent as the file that it leads to.
+    absolute = {Path(os.path.abspath(root.parent / file)) for file in files}  # noqa: PTH100 - resolve follows links
+    found = {file for file in absolute if file.is_file()}
+    return found, absolute - found

@@ -1,0 +1,264 @@
+"""`diaphane retrain`: what the continuous integration of a repository of scenes calls when one of them changes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from schemas.problem import ExitCode, Problem
+from services.cli import output
+from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption, connect
+from services.cli.state import JsonOption
+from services.cli.submit import (
+    AlphaOption,
+    BudgetsOption,
+    PriorityOption,
+    SeedOption,
+    SizeOption,
+    SteepnessOption,
+    StepsOption,
+    TailOption,
+    ViewsOption,
+    ViewsPerSceneOption,
+    job_fields,
+    job_spec,
+)
+
+if TYPE_CHECKING:
+    from services.cli.comparison import Comparison
+    from services.cli.remote import Remote
+
+CHAMPION = "champion"
+_SHOWN_TASKS = 5
+
+
+def retrain(
+    scenes: Annotated[list[str], typer.Argument(help="Scenes, files or ids, to train on.")],
+    name: Annotated[str, typer.Option("--name", help="Name of the bundle in the registry.")],
+    holdout: Annotated[
+        list[str], typer.Option("--holdout", help="Committed scene to evaluate on and never train on; repeatable.")
+    ],
+    max_regression: Annotated[
+        float, typer.Option("--max-regression", help="Fraction by which an error may exceed the champion's.")
+    ] = 0.05,
+    baseline: Annotated[str, typer.Option("--baseline", help="champion, or none: nothing is compared.")] = CHAMPION,
+    start_from: Annotated[str, typer.Option("--start-from", help="Weights: champion or scratch.")] = CHAMPION,
+    is_promoted: Annotated[bool, typer.Option("--promote", help="Make it the champion if it is better.")] = False,
+    summary: Annotated[Path | None, typer.Option("--summary", help="File that the Markdown table goes to.")] = None,
+    budgets: BudgetsOption = None,
+    alpha: AlphaOption = None,
+    views: ViewsOption = None,
+    views_per_scene: ViewsPerSceneOption = None,
+    size: SizeOption = None,
+    tail: TailOption = None,
+    g: SteepnessOption = None,
+    seed: SeedOption = None,
+    steps: StepsOption = None,
+    priority: PriorityOption = None,
+    url: UrlOption = DEFAULT_URL,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Build from changed scenes, compare with the champion on the held-out ones, and fail if that is worse.
+
+    The same scenes again find the same job. The new version stays a candidate unless --promote is given.
+    """
+    _check(max_regression, baseline, start_from)
+    fields = job_fields(
+        budgets=budgets,
+        alpha=alpha,
+        views_per_scene=views_per_scene,
+        size=size,
+        tail=tail,
+        g=g,
+        seed=seed,
+        steps=steps,
+        priority=priority,
+    )
+    remote = connect(url, key_file)
+    champion = _champion(remote, name)
+    fields |= {"kind": "build", "name": name, "promote": "never"}
+    fields["start_from"] = start_from if champion is not None else "scratch"
+    spec = _with_scenes(remote, fields, scenes, holdout, views, silent=as_json)
+    job, rival = _finished(remote, spec, champion, silent=as_json)
+    comparison = _compare(remote, job, spec, rival if baseline == CHAMPION else None)
+    faults = comparison.faults(max_regression)
+    if is_promoted and not faults and comparison.is_better:
+        _promote(remote, name, comparison)
+    _publish(comparison.markdown(max_regression), summary)
+    _hand_on({"reference": comparison.reference, "job": job["id"], "passed": str(not faults).lower()})
+    if as_json:
+        output.print_json(_as_json(job, comparison, faults))
+    else:
+        print(comparison.markdown(max_regression), end="")
+    if faults:
+        raise Problem(
+            f"{comparison.reference} does not pass: {' '.join(faults)}",
+            f"Look at the pictures of the job {job['id']}, or raise --max-regression on purpose.",
+            ExitCode.CHECK_FAILED,
+        )
+
+
+def _check(max_regression: float, baseline: str, start_from: str) -> None:
+    if not (math.isfinite(max_regression) and max_regression >= 0.0):
+        raise Problem(f"--max-regression {max_regression} is not a fraction.", "Write it like --max-regression 0.05.")
+    for option, value, known in (
+        ("baseline", baseline, (CHAMPION, "none")),
+        ("start-from", start_from, (CHAMPION, "scratch")),
+    ):
+        if value not in known:
+            raise Problem(f"--{option} '{value}' is not known.", f"Choose {' or '.join(known)}.")
+
+
+def _champion(remote: Remote, name: str) -> dict[str, Any] | None:
+    """The champion of a name, if there is one yet."""
+    from services.cli.transport import RefusedRequest
+
+    try:
+        return remote.version(name, CHAMPION)
+    except RefusedRequest as refused:
+        if refused.code is ExitCode.NOT_FOUND:
+            return None
+        raise
+
+
+def _with_scenes(
+    remote: Remote,
+    fields: Mapping[str, Any],
+    scenes: list[str],
+    holdout: list[str],
+    views: Path | None,
+    *,
+    silent: bool,
+) -> dict[str, Any]:
+    from services.cli.inputs import bring, named_scenes, scene_uses
+
+    inputs = named_scenes(scenes, holdout)
+    stand_ins = [{"scene": f"scn_{i:032x}", "holdout": given.held_out} for i, given in enumerate(inputs)]
+    job_spec({**fields, "scenes": stand_ins})  # whatever is wrong is said before anything is uploaded
+    known = bring(remote, [given.reference for given in inputs], silent=silent)
+    return job_spec({**fields, "scenes": scene_uses(inputs, known, views)})
+
+
+def _finished(
+    remote: Remote, spec: dict[str, Any], champion: dict[str, Any] | None, *, silent: bool
+) -> tuple[dict[str, Any], str | None]:
+    """The job of these scenes, finished, and the version that it was compared with.
+
+    A repeated run finds the job of the first: by its key, or because the champion itself came of it.
+    """
+    from services.cli.watching import ensure_success, follow
+
+    before = None if champion is None else str(champion["version"])
+    job = _job_of(remote, champion, spec)
+    if job is not None:
+        before = _before(remote, spec["name"], str(before))
+    else:
+        job, is_new = remote.submit(spec, _idempotency_key(spec, before))
+        if not is_new and job["state"] in ("failed", "cancelled"):
+            job = remote.retry(job["id"])
+    if not silent:
+        output.err().print(f"Job {job['id']}: {job['state']}", markup=False)
+    job = follow(remote, job["id"], silent=silent)
+    ensure_success(job)
+    return job, before
+
+
+def _job_of(remote: Remote, version: dict[str, Any] | None, spec: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The job that published a version, if it was the very same job."""
+    from services.cli.transport import RefusedRequest
+
+    if version is None or not version.get("job_id"):
+        return None
+    try:
+        job = remote.job(version["job_id"])
+    except RefusedRequest as refused:
+        if refused.code is ExitCode.NOT_FOUND:  # jobs are removed by age
+            return None
+        raise
+    # The first version had no champion to start from; all else has to be the same.
+    mine, its = ({**s, "start_from": None, "priority": None} for s in (spec, job["spec"]))
+    return job if job["state"] == "succeeded" and mine == its else None
+
+
+def _before(remote: Remote, name: str, version: str) -> str | None:
+    """The champion before a version became it."""
+    moves = [m for m in remote.aliases(name)["history"] if m["alias"] == CHAMPION and m["after"] == version]
+    return max(moves, key=lambda move: str(move["at"]))["before"] if moves else None
+
+
+def _idempotency_key(spec: Mapping[str, Any], champion: str | None) -> str:
+    """Scenes are named by their content, so the spec is all content; against another champion it is another job."""
+    text = json.dumps({"spec": spec, CHAMPION: champion}, sort_keys=True, separators=(",", ":"))
+    return f"retrain-{hashlib.sha256(text.encode()).hexdigest()}"
+
+
+def _compare(remote: Remote, job: dict[str, Any], spec: Mapping[str, Any], champion: str | None) -> Comparison:
+    from services.cli.comparison import code, comparison_of
+
+    notes = []
+    if job.get("skipped"):
+        counts = ", ".join(f"{count} {what}" for what, count in job["skipped"].items())
+        notes.append(f"Skipped, because it was there already: {code(counts)}.")
+    for task in remote.tasks(job["id"], _SHOWN_TASKS, state="quarantined"):
+        problem = task.get("problem") or {}
+        what = f"{task['stage']} of {task['name']}: {problem.get('detail', 'it failed')}"
+        notes.append(f"Left out: {code(what)}.")
+    notes.append(f"Job {code(job['id'])}.")
+    expected = sum(use["holdout"] for use in spec["scenes"])
+    return comparison_of(job, champion, expected, tuple(notes))
+
+
+def _promote(remote: Remote, name: str, comparison: Comparison) -> None:
+    version = comparison.reference.partition("@")[2]
+    parity = remote.version(name, version).get("parity") or {}
+    if max(parity["torch_onnx"], parity["torch_glsl"]) > parity["tolerance"]:
+        raise Problem(
+            f"{comparison.reference} is better, but its exported forms do not agree.",
+            "Report it; the version stays a candidate.",
+            ExitCode.CHECK_FAILED,
+        )
+    change = comparison.total.change
+    why = "first version" if change is None else f"error {100.0 * change:+.1f} % on the committed scenes"
+    remote.move_alias(name, CHAMPION, version, f"diaphane retrain: {why}")
+
+
+def _publish(table: str, summary: Path | None) -> None:
+    """Writes the table to the file that was asked for, and onto the page of a GitHub workflow's run."""
+    if summary is not None:
+        summary.write_text(table, encoding="utf-8")
+    if page := os.environ.get("GITHUB_STEP_SUMMARY"):
+        with Path(page).open("a", encoding="utf-8") as stream:
+            stream.write(table)
+
+
+def _hand_on(outputs: Mapping[str, str]) -> None:
+    """Sets the outputs of a GitHub workflow's step."""
+    if path := os.environ.get("GITHUB_OUTPUT"):
+        with Path(path).open("a", encoding="utf-8") as stream:
+            stream.writelines(f"{name}={value}\n" for name, value in outputs.items())
+
+
+def _as_json(job: dict[str, Any], comparison: Comparison, faults: list[str]) -> dict[str, Any]:
+    rows = [
+        {"scene": row.scene, "score": row.score, "rival": row.rival, "change": row.change} for row in comparison.rows
+    ]
+    return {
+        "reference": comparison.reference,
+        "champion": comparison.champion,
+        "passed": not faults,
+        "faults": faults,
+        "score": comparison.total.score,
+        "rival_score": comparison.total.rival,
+        "change": comparison.total.change,
+        "scenes": rows,
+        "job": job["id"],
+        "report": (job["result"] or {}).get("report"),
+    }

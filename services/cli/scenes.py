@@ -1,0 +1,83 @@
+"""`diaphane scenes`: what the server may render."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from services.cli import output
+from services.cli.lines import plain, print_columns, size
+from services.cli.server import DEFAULT_URL, KeyFileOption, LimitOption, UrlOption, connect
+from services.cli.state import JsonOption
+
+app = typer.Typer(help="Scenes on a server: upload, list, show.", no_args_is_help=True)
+
+
+@app.command()
+def upload(
+    files: Annotated[list[Path], typer.Argument(help="Scenes: .usd, .usda, .usdc, .usdz, .glb.")],
+    name: Annotated[str | None, typer.Option("--name", help="What the scene is called. Default: its file.")] = None,
+    wait: Annotated[bool, typer.Option("--wait/--no-wait", help="Wait until the server has checked them.")] = True,
+    url: UrlOption = DEFAULT_URL,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Upload scenes with all files that they use; only what the server lacks is sent."""
+    from schemas.problem import Problem
+    from services.cli import inputs
+    from services.cli.packing import pack
+    from services.progress import make_progress
+
+    if name is not None and len(files) > 1:
+        raise Problem("One name cannot be that of several scenes.", "Upload them one by one, or leave --name out.")
+    packages = [pack(path, name) for path in files]
+    remote = connect(url, key_file)
+    scenes = inputs.upload(remote, packages, make_progress(sys.stderr, silent=as_json))
+    if wait:
+        scenes = [remote.wait_for_scene(scene["id"]) for scene in scenes]
+    _show_all(scenes, as_json=as_json)
+    for path, scene in zip(files, scenes, strict=True):
+        inputs.ensure_accepted(scene, str(path))
+
+
+@app.command("list")
+def list_(
+    limit: LimitOption = 50,
+    url: UrlOption = DEFAULT_URL,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Scenes that were uploaded, newest first."""
+    _show_all(list(connect(url, key_file).scenes(limit)), as_json=as_json)
+
+
+@app.command()
+def show(
+    scene_id: Annotated[str, typer.Argument(metavar="ID", help="Id of the scene.")],
+    url: UrlOption = DEFAULT_URL,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """A scene: its files, what was found in it, or why it was rejected."""
+    scene = connect(url, key_file).scene(scene_id)
+    if as_json:
+        output.print_json(scene)
+        return
+    print(f"{scene['id']}  {plain(scene['name'])}  {scene['state']}  {scene['created']}")
+    if problem := scene.get("problem"):
+        print(f"  {plain(problem.get('detail') or problem['title'])}\n  {plain(problem.get('remedy', ''))}".rstrip())
+    for fact, value in (scene.get("facts") or {}).items():
+        print(f"  {plain(fact)}: {plain(value)}")
+    rows = [(name, size(file["bytes"]), file["sha256"]) for name, file in scene["files"].items()]
+    print_columns(("file", "size", "sha256"), rows)
+
+
+def _show_all(scenes: list[dict[str, Any]], *, as_json: bool) -> None:
+    if as_json:
+        output.print_json({"scenes": scenes})
+        return
+    rows = [(s["id"], s["state"], size(s["bytes"]), s["created"], s["name"]) for s in scenes]
+    print_columns(("id", "state", "size", "created", "name"), rows)
