@@ -6,7 +6,7 @@ ARGS ?=
 # The scenes that the result is judged by, and that are never trained on.
 HOLDOUT ?= bottles foliage
 
-.PHONY: help setup quickstart test lint format lock clean
+.PHONY: help setup setup-tests quickstart test lint format lock clean
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -22,16 +22,19 @@ lint: setup ## style, types, direction of imports
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/lint-imports
+	PYTHONPATH=deploy/client/python $(BIN)/lint-imports
 
-test: lint ## lint, then all tests
+setup-tests: setup
+	@scripts/setup-tests.sh
+
+test: setup-tests lint ## lint, then all tests
 	$(BIN)/pytest $(ARGS)
 
 format: setup ## rewrite the sources in the house style
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-lock: ## requirements.lock anew from pyproject.toml (needs uv)
+lock: ## all locks anew from pyproject.toml (needs uv)
 	scripts/lock.sh
 
 clean: ## remove the environment, caches and the samples; keeps .diaphane

@@ -5,21 +5,8 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-say() { printf 'setup: %s\n' "$*" >&2; }
-die() { say "$*"; exit 1; }
-
-apt_install() { # why, packages...
-    local why=$1; shift
-    command -v apt-get >/dev/null || die "$why, and there is no apt-get here: install the equivalent of '$*' and run this again."
-    local root=()
-    if [ "$(id -u)" -ne 0 ]; then
-        command -v sudo >/dev/null || die "$why: run 'apt-get install $*' as root, then run this again."
-        root=(sudo)
-    fi
-    say "$why: installing $* with apt-get."
-    "${root[@]}" env DEBIAN_FRONTEND=noninteractive sh -c \
-        'apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@" >/dev/null' sh "$@"
-}
+# shellcheck source=scripts/common.sh
+. scripts/common.sh
 
 find_python() {
     local candidate
@@ -63,7 +50,7 @@ ensure_context() {
 }
 
 # The folder is part of the stamp because a virtual environment does not survive being moved.
-stamp=$({ pwd; cat requirements.lock pyproject.toml scripts/setup.sh; } | sha256sum | cut -d' ' -f1)
+stamp=$({ pwd; cat requirements.lock pyproject.toml scripts/setup.sh scripts/common.sh; } | sha256sum | cut -d' ' -f1)
 [ "$(cat .venv/.stamp 2>/dev/null)" = "$stamp" ] && exit 0
 make_venv
 install_packages

@@ -1,0 +1,18 @@
+# shellcheck shell=bash
+# Sourced by the other scripts.
+
+say() { printf 'setup: %s\n' "$*" >&2; }
+die() { say "$*"; exit 1; }
+
+apt_install() { # why, packages...
+    local why=$1; shift
+    command -v apt-get >/dev/null || die "$why, and there is no apt-get here: install the equivalent of '$*' and run this again."
+    local root=()
+    if [ "$(id -u)" -ne 0 ]; then
+        command -v sudo >/dev/null || die "$why: run 'apt-get install $*' as root, then run this again."
+        root=(sudo)
+    fi
+    say "$why: installing $* with apt-get."
+    "${root[@]}" env DEBIAN_FRONTEND=noninteractive sh -c \
+        'apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@" >/dev/null' sh "$@"
+}
