@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,7 +53,7 @@ def build(plan: Plan, runner: Runner) -> Built:
     """
     scenes = steps.read_scenes(plan, runner)
     views = steps.label_views(plan, runner, steps.render_views(plan, runner, scenes))
-    champion = runner.registry.champion(plan.name)
+    champion = _champion(plan, runner)
     bundle = _learn(plan, runner, scenes, views, champion)
     judged = [view for view in views if view.scene.held_out] or list(views)
     evaluated = steps.evaluate_views(plan, runner, judged, bundle.source, bundle.task)
@@ -123,7 +123,7 @@ def run_job(spec: JobSpec, scenes: Mapping[str, SceneRecord], runner: Runner, jo
     views = steps.label_views(plan, runner, rendered)
     dataset = _record_dataset(plan, runner, views)
     if spec.kind == "train":
-        champion = runner.registry.champion(plan.name)
+        champion = _champion(plan, runner)
         return {"dataset": dataset, **_publish_unscored(runner, _learn(plan, runner, entries, views, champion))}
     if spec.kind == "evaluate":
         return {"dataset": dataset, **_evaluate_job(plan, runner, views, str(spec.model))}
@@ -158,7 +158,8 @@ def _build_job(plan: Plan, runner: Runner, job: JobContext) -> dict[str, Any]:
 
 
 def _evaluate_job(plan: Plan, runner: Runner, views: Sequence[LabelledView], model: str) -> dict[str, Any]:
-    publication = runner.registry.resolve(model)
+    meant = runner.step("resolve model", lambda: runner.registry.resolve(model).version)
+    publication = runner.registry.resolve(f"{model.partition('@')[0]}@{meant}")
     evaluated = steps.evaluate_views(plan, runner, views, source_of_version(runner.registry.record(publication)), None)
     reference = f"{publication.name}@{publication.version}"
     _record(runner, evaluated, reference)
@@ -174,7 +175,7 @@ def _train_on_dataset(plan: Plan, runner: Runner, dataset: str) -> dict[str, Any
     record = runner.measured.dataset(dataset)
     shards = [(shard.scene_digest, shard.artifact) for shard in record.shards]
     scenes = {shard.scene: shard.scene_digest for shard in record.shards}
-    start = _start(plan, runner, runner.registry.champion(plan.name))
+    start = _start(plan, runner, _champion(plan, runner))
     bundle = steps.learn(plan.described_by(record.settings), runner, shards, scenes, {}, start)
     return {"dataset": dataset, **_publish_unscored(runner, bundle)}
 
@@ -193,6 +194,21 @@ def _learn(
         {scene.label: scene.digest for scene in scenes if scene.held_out == held} for held in (False, True)
     )
     return steps.learn(plan, runner, shards, trained, held_out, _start(plan, runner, champion))
+
+
+def _champion(plan: Plan, runner: Runner) -> Publication | None:
+    """The name's champion when the job first asked.
+
+    A job that is taken over asks again, and may have made its own version the champion meanwhile: it would train anew
+    from that one, or not find the rival that it was compared with.
+    """
+
+    def body() -> str | None:
+        found = runner.registry.champion(plan.name)
+        return None if found is None else found.version
+
+    version = runner.step("find champion", body)
+    return None if version is None else runner.registry.resolve(f"{plan.name}@{version}")
 
 
 def _start(plan: Plan, runner: Runner, champion: Publication | None) -> Source | None:
@@ -234,39 +250,51 @@ def _publish(
     }
 
     def body() -> dict[str, Any]:
-        publication = _into_registry(runner, bundle, score, evaluation)
+        publication, known = _into_registry(runner, bundle, score, evaluation)
         promoted, reason = runner.registry.consider(publication, score, rival_score, promote=plan.promote)
-        reference = f"{publication.name}@{publication.version}"
-        folder = str(runner.registry.folder(publication))
-        return {"reference": reference, "folder": folder, "champion": promoted, "reason": reason, "score": score}
+        result = RegistryResult(
+            reference=f"{publication.name}@{publication.version}",
+            folder=str(runner.registry.folder(publication)),
+            champion=promoted,
+            reason=reason,
+            score=score,
+        )
+        return {"known": known, "result": result.model_dump(mode="json")}
 
-    return RegistryResult.model_validate(runner.step("publish", body)), rival_score
+    return RegistryResult.model_validate(_published(runner, body)), rival_score
 
 
 def _publish_unscored(runner: Runner, bundle: Bundle) -> dict[str, Any]:
     """Publishes what was not measured: a version without a score, which nothing promotes by itself."""
 
     def body() -> dict[str, Any]:
-        publication = _into_registry(runner, bundle, None, {})
+        publication, known = _into_registry(runner, bundle, None, {})
         _, reason = runner.registry.consider(publication, None, None, promote=False)
-        return {
-            "reference": f"{publication.name}@{publication.version}",
-            "score": None,
-            "champion": False,
-            "reason": reason,
-        }
+        reference = f"{publication.name}@{publication.version}"
+        result = {"reference": reference, "score": None, "champion": False, "reason": reason}
+        return {"known": known, "result": result}
 
-    published: dict[str, Any] = runner.step("publish", body)
-    return published
+    return _published(runner, body)
 
 
-def _into_registry(runner: Runner, bundle: Bundle, score: float | None, evaluation: Mapping[str, Any]) -> Publication:
-    folder = runner.store.fetch(bundle.task.artifact) / BUNDLE
-    known = {publication.digest for publication in runner.registry.versions(bundle.name)}
-    if bundle.digest in known:
+def _published(runner: Runner, body: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """Publishes once; a job that is taken over afterwards counts the same skips."""
+    outcome = runner.step("publish", body)
+    if outcome["known"]:
         runner.progress.skipped("bundles already published")
+    result: dict[str, Any] = outcome["result"]
+    return result
+
+
+def _into_registry(
+    runner: Runner, bundle: Bundle, score: float | None, evaluation: Mapping[str, Any]
+) -> tuple[Publication, bool]:
+    """The version of a bundle, and whether it was published before."""
+    folder = runner.store.fetch(bundle.task.artifact) / BUNDLE
+    known = bundle.digest in {publication.digest for publication in runner.registry.versions(bundle.name)}
     artifacts = (bundle.task.artifact, *bundle.task.needs)
-    return runner.registry.publish(bundle.name, folder, score, evaluation, artifacts=artifacts, job_id=runner.job_id)
+    made = runner.registry.publish(bundle.name, folder, score, evaluation, artifacts=artifacts, job_id=runner.job_id)
+    return made, known
 
 
 def _record(runner: Runner, evaluated: Sequence[EvaluatedView], reference: str) -> None:

@@ -36,7 +36,7 @@ def list_versions(name: NamePath, service: Services, paging: Page) -> VersionPag
     """Versions of a name, newest first."""
     _model(service, name)
     publications = paging.slice(service.registry.versions(name)[::-1], lambda publication: publication.version)
-    return VersionPage(items=[service.registry.record(publication) for publication in publications])
+    return VersionPage(items=service.registry.records(name, publications))
 
 
 @router.get("/models/{name}/versions/{version}")

@@ -25,7 +25,7 @@ def out() -> Console:
 
 def err() -> Console:
     """Console for progress and errors."""
-    return Console(file=sys.stderr, highlight=False, soft_wrap=True)
+    return Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 def print_json(value: Any) -> None:

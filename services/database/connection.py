@@ -8,7 +8,9 @@ Rules:
 
 from __future__ import annotations
 
+import threading
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -24,6 +26,8 @@ from services.database import tables
 T = TypeVar("T")
 
 PATIENCE_SECONDS = 60.0
+_writers: defaultdict[str, threading.Lock] = defaultdict(threading.Lock)
+"""SQLite lets waiting writers try again at intervals, and some starve: those of a process take turns by a lock."""
 _OPTIONS = "-c statement_timeout=30000 -c idle_in_transaction_session_timeout=15000"
 """A process that is stopped in the middle of a transaction must not hold its locks for ever."""
 _LOCK = 0x64696170  # of the migration, any number that nobody else uses
@@ -48,10 +52,13 @@ class Database:
     @contextmanager
     def write(self) -> Iterator[sa.Connection]:
         """A transaction that writes: committed when the context is left, rolled back if it raises."""
-        with self.engine.connect() as connection:
-            if not self.is_postgresql:
-                connection.exec_driver_sql("BEGIN IMMEDIATE")
-            with connection.begin() if self.is_postgresql else _commit(connection):
+        if self.is_postgresql:
+            with self.engine.begin() as connection:
+                yield connection
+            return
+        with _writers[self.url], self.engine.connect() as connection:
+            connection.exec_driver_sql("BEGIN IMMEDIATE")
+            with _commit(connection):
                 yield connection
 
     @contextmanager
@@ -120,7 +127,15 @@ def open_database(url: str) -> Database:
 def _engine(url: str) -> sa.Engine:
     if url.startswith("sqlite:///"):
         Path(url.removeprefix("sqlite:///")).parent.mkdir(parents=True, exist_ok=True)
-        engine = sa.create_engine(url, hide_parameters=True, connect_args={"timeout": 30.0, "isolation_level": None})
+        engine = sa.create_engine(
+            url,
+            hide_parameters=True,
+            # More in all than the API has threads: none waits for a connection. Those used last are used again first.
+            pool_size=16,
+            max_overflow=48,
+            pool_use_lifo=True,
+            connect_args={"timeout": 30.0, "isolation_level": None},
+        )
         event.listen(engine, "connect", _set_up_sqlite)
         return engine
     if url.startswith(("postgresql://", "postgres://")):

@@ -182,7 +182,7 @@ measurements = _table(
     sa.Column("job_id", sa.Text),
     sa.Column("model", sa.Text, index=True),  # name@version of the bundle, for its own pictures
     sa.Column("scene", sa.Text, nullable=False, index=True),
-    sa.Column("scene_digest", sa.Text, nullable=False),
+    sa.Column("scene_digest", sa.Text, nullable=False, index=True),
     sa.Column("view", sa.Text, nullable=False),
     sa.Column("technique", sa.Text, nullable=False, index=True),
     sa.Column("budget_factor", sa.Double, nullable=False),

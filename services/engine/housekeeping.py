@@ -1,4 +1,4 @@
-"""Retention, once an hour by one of the processes that conduct jobs."""
+"""Retention, once an hour: of the service by one of the processes that conduct jobs, of a cache by its own process."""
 
 from __future__ import annotations
 
@@ -37,10 +37,15 @@ class Housekeeping:
         database: The database.
         client: Of the workflows in it.
         storage: Artifacts and blobs.
+        conducts: Whether this process conducts jobs.
     """
 
-    def __init__(self, settings: Settings, database: Database, client: DBOSClient, storage: Storage) -> None:
+    def __init__(
+        self, settings: Settings, database: Database, client: DBOSClient, storage: Storage, *, conducts: bool
+    ) -> None:
         self._settings, self._database, self._client, self._storage = settings, database, client, storage
+        self._conducts = conducts
+        self._cache_swept = time.monotonic()
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True, name="housekeeping")
 
@@ -80,7 +85,10 @@ class Housekeeping:
         while not self._end.wait(wait):
             wait = FIRST_SECONDS
             try:
-                if self._due():
+                if time.monotonic() - self._cache_swept >= PERIOD_SECONDS:
+                    self._cache_swept = time.monotonic()
+                    self._sweep_cache()
+                if self._conducts and self._due():
                     self._sweep()
             except Exception:
                 log.exception("housekeeping failed and is tried again")
@@ -100,6 +108,11 @@ class Housekeeping:
             return True
 
         return self._database.retry(body)
+
+    def _sweep_cache(self) -> None:
+        from services.retention import sweep_cache
+
+        sweep_cache(self._storage, self._settings, time.time())
 
     def _sweep(self) -> None:
         from services.retention import sweep

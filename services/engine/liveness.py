@@ -13,6 +13,7 @@ Rules:
 
 from __future__ import annotations
 
+import math
 import os
 import socket
 import threading
@@ -176,7 +177,9 @@ class Liveness:
         self._claims.lose(held - owned)
         idle = owned - self._claims.held()
         self._orphans = Counter({workflow_id: self._orphans[workflow_id] + 1 for workflow_id in idle})
-        orphans = [workflow_id for workflow_id, looks in self._orphans.items() if looks >= ORPHAN_LOOKS]
+        # A busy machine takes its time between a claim and its run, and between the end of a run and its record.
+        patience = max(ORPHAN_LOOKS, math.ceil(self._settings.ttl / self._settings.heartbeat))
+        orphans = [workflow_id for workflow_id, looks in self._orphans.items() if looks >= patience]
         if orphans and not self._claims.draining.is_set():
             log.warning("claims without a run go back to the queue", workflows=orphans)
             with self._database.write() as connection:

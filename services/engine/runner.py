@@ -11,7 +11,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import structlog
 
@@ -135,8 +135,11 @@ class DurableRunner:
         return [facts[task.name] for task in tasks]
 
     def step(self, name: str, body: Callable[[], Any]) -> Any:
-        """See `services.tasks.Runner`; a problem is remembered as well as a result."""
-        outcome = self._once(name, lambda: _outcome(body))
+        """See `services.tasks.Runner`; a problem is remembered as well as a result.
+
+        An artifact that the step needs and that is gone is made again.
+        """
+        outcome = self._once(name, lambda: _outcome(lambda: self._with_artifacts(body)))
         if "problem" in outcome:
             title, remedy, code = outcome["problem"]
             raise Problem(title, remedy, ExitCode(code))
@@ -160,6 +163,16 @@ class DurableRunner:
                 log.exception("step failed and is tried again", step=name)
                 time.sleep(1.0)
         raise AssertionError("the last try returns or raises")
+
+    def _with_artifacts(self, body: Callable[[], Any]) -> Any:
+        for _ in range(REMAKE_TRIES):
+            try:
+                return body()
+            except MissingArtifact as missing:
+                log.warning("a step needs an artifact that is gone", artifact=missing.artifact)
+                self._tasks.remake(self._claim, self._id, missing.artifact)
+                self._join(cast("StageName", missing.artifact.partition("/")[0]))
+        return body()
 
     def _check(self) -> None:
         """Whether the job goes on, here."""

@@ -131,12 +131,13 @@ class Runtime:
         options = self._child_options(sum(children.values()))
         self._worker = Worker(self.settings, self._parts.storage, self._tasks, self._claims, options, children)
         self._liveness = Liveness(self.settings, self._database, self._claims, self._slots, self._see_to_adrift)
-        self._housekeeping = Housekeeping(self.settings, self._database, self._jobs.client, self._parts.storage)
+        self._housekeeping = Housekeeping(
+            self.settings, self._database, self._jobs.client, self._parts.storage, conducts="jobs" in self.roles
+        )
         self._liveness.beat()  # before anything can be claimed
         self._launch()
         self._liveness.start()
-        if "jobs" in self.roles:
-            self._housekeeping.start()
+        self._housekeeping.start()
         log.info("taking work", executor=self.executor, roles=self.roles)
 
     def stop(self) -> None:

@@ -235,21 +235,28 @@ class Registry:
         Raises:
             MissingBlob: Its manifest is no longer in the store.
         """
-        row, manifest = self._row(publication), self._manifest(publication)
-        query = sa.select(aliases.c.alias).where((aliases.c.name == row.name) & (aliases.c.version == row.version))
+        return self.records(publication.name, [publication])[0]
+
+    def records(self, name: str, publications: Sequence[Publication]) -> list[VersionRecord]:
+        """Everything about some versions of a name, in two queries however many they are.
+
+        Raises:
+            MissingBlob: The manifest of one is no longer in the store.
+        """
+        wanted = [publication.version for publication in publications]
+        chosen = sa.select(versions).where((versions.c.name == name) & versions.c.version.in_(wanted))
+        meant = sa.select(aliases).where((aliases.c.name == name) & aliases.c.version.in_(wanted))
         with self._database.read() as connection:
-            meaning = tuple(connection.scalars(query.order_by(aliases.c.alias)))
-        return VersionRecord(
-            **publication.model_dump(),
-            parity=manifest.parity.model_dump(mode="json"),
-            provenance=manifest.provenance.model_dump(mode="json"),
-            files=_files(row),
-            statement=row.statement,
-            signature=row.signature,
-            public_key=row.public_key,
-            aliases=meaning,
-            job_id=row.job_id,
-        )
+            rows = {row.version: row for row in connection.execute(chosen)}
+            marks = connection.execute(meant.order_by(aliases.c.alias)).all()
+        return [
+            self._record(
+                publication,
+                rows[publication.version],
+                tuple(mark.alias for mark in marks if mark.version == publication.version),
+            )
+            for publication in publications
+        ]
 
     def models(self) -> list[ModelRecord]:
         """All names, sorted, with their latest version and their aliases."""
@@ -323,15 +330,28 @@ class Registry:
         with self._database.read() as connection:
             return connection.execute(sa.select(versions).where(mine)).one()
 
-    def _manifest(self, publication: Publication) -> Manifest:
-        if publication.digest not in self._manifests:
-            reference = _files(self._row(publication))[MANIFEST]
-            content = b"".join(self._blobs.read(reference.sha256))
-            self._manifests[publication.digest] = Manifest.model_validate_json(content)
-        return self._manifests[publication.digest]
+    def _record(self, publication: Publication, row: Any, meaning: tuple[str, ...]) -> VersionRecord:
+        manifest = self._manifest(row)
+        return VersionRecord(
+            **publication.model_dump(),
+            parity=manifest.parity.model_dump(mode="json"),
+            provenance=manifest.provenance.model_dump(mode="json"),
+            files=_files(row),
+            statement=row.statement,
+            signature=row.signature,
+            public_key=row.public_key,
+            aliases=meaning,
+            job_id=row.job_id,
+        )
+
+    def _manifest(self, row: Any) -> Manifest:
+        if row.digest not in self._manifests:
+            content = b"".join(self._blobs.read(_files(row)[MANIFEST].sha256))
+            self._manifests[row.digest] = Manifest.model_validate_json(content)
+        return self._manifests[row.digest]
 
     def _parity_holds(self, publication: Publication) -> bool:
-        parity = self._manifest(publication).parity
+        parity = self._manifest(self._row(publication)).parity
         return max(parity.torch_onnx, parity.torch_glsl) <= parity.tolerance
 
 

@@ -13,9 +13,9 @@ from schemas.bundle import load_manifest
 from schemas.problem import Problem
 from services import steps, summary
 from services.build import build
+from services.local import open_local
 from services.options import BuildOptions
 from services.progress import SilentProgress
-from services.local import open_local
 from services.result import BuildResult
 
 TRAIN = ("nested_shells.usda", "torus_knots.usdc")

@@ -19,7 +19,7 @@ from support.bundles import TOLERANCE, make_bundle
 from schemas.bundle import FILES, load_manifest
 from schemas.problem import ExitCode, Problem
 from services.database import open_database, tables
-from services.registry import CANDIDATE, PUBLICATION, Registry, bundle_digest, check_name, open_registry
+from services.registry import CANDIDATE, CHAMPION, PUBLICATION, Registry, bundle_digest, check_name, open_registry
 from services.registry.signing import verify
 from services.settings import Settings
 from services.storage import MissingBlob, Storage, open_storage
@@ -360,6 +360,17 @@ def test_a_record_is_signed_and_says_all(database_url: str, tmp_path: Path) -> N
     assert not verify(record.public_key, record.statement.replace("1.0.0", "1.0.1"), record.signature)
     assert not verify(record.public_key, record.statement, "AAAA")
     assert not verify("no base64", record.statement, record.signature)
+
+
+def test_records_of_several_versions_are_those_of_each(registry: Registry, tmp_path: Path) -> None:
+    for weights in "abc":
+        publish(registry, tmp_path, weights)
+    registry.promote("glass", "1.2.0", "a trial", alias="trial")
+    chosen = [registry.resolve(f"glass@{version}") for version in ("1.2.0", "1.0.0")]
+    records = registry.records("glass", chosen)
+    assert records == [registry.record(publication) for publication in chosen]
+    assert [record.aliases for record in records] == [(CANDIDATE, "trial"), (CHAMPION,)]
+    assert registry.records("glass", []) == []
 
 
 def test_a_version_never_changes(registry: Registry, tmp_path: Path) -> None:

@@ -227,7 +227,7 @@ def test_old_workflows_are_removed_but_for_those_of_open_jobs(bench: Bench) -> N
     bench.fleet.jobs.cancel(other)
     bench.set(bench.workflow(0), status="SUCCESS", completed_at=1)
     bench.set(f"{other}.1", completed_at=1)
-    keeper = Housekeeping(bench.fleet.settings, bench.database, bench.fleet.jobs.client, None)  # type: ignore[arg-type]
+    keeper = Housekeeping(bench.fleet.settings, bench.database, bench.fleet.jobs.client, None, conducts=True)  # type: ignore[arg-type]
     assert keeper.prune() == 1
     table = system.workflows(bench.database)
     with bench.database.read() as connection:
