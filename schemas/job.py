@@ -47,6 +47,13 @@ class SceneUse(BaseModel):
     holdout: bool = False
     views: tuple[ListedView, ...] = Field(default=(), max_length=LIMITS.views)
 
+    @model_validator(mode="after")
+    def _have_directions(self) -> Self:
+        for number, view in enumerate(self.views):
+            if not view.has_direction:
+                raise ValueError(f"view {number} has no direction: eye and target coincide, or up is parallel to it")
+        return self
+
 
 class JobSpec(BaseModel):
     """A job as submitted.
@@ -67,7 +74,8 @@ class JobSpec(BaseModel):
         seed: Seed of everything drawn at random.
         steps: Optimiser steps; None: the trainer's default.
         start_from: Weights that the training begins with: drawn by the seed, or those of the name's champion.
-        promote: Whether a better version becomes the champion, or stays a candidate.
+        promote: Whether a better version becomes the champion, or stays a candidate; a key without the scope `publish`
+            gets the latter.
         priority: Class of the job's tasks in the queues; within a class, jobs share fairly.
     """
 

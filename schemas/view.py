@@ -26,6 +26,15 @@ class ListedView(BaseModel):
     up: Vec3
     fov: float = Field(gt=0.0, lt=180.0)
 
+    @property
+    def has_direction(self) -> bool:
+        """Whether eye and target differ, and up is not parallel to the view axis."""
+        try:
+            View(name="", eye=self.eye, target=self.target, up=self.up, fov=self.fov).world_to_view()
+        except ValueError:
+            return False
+        return True
+
 
 class View(BaseModel):
     """A camera. Right-handed, looks along -z of its own frame; depth is the distance along that axis.

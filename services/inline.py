@@ -53,6 +53,7 @@ class InlineRunner:
         self.store, self.blobs = storage.store, storage.blobs
         self.registry, self.measured, self.progress = registry, measured, progress
         self.job_id: str | None = None
+        self.who: str | None = None
         self.worked = False
         """Whether any artifact was made."""
         self._desk = Desk(storage.store, lambda source: materialise(source, storage.blobs, storage.store.root / "tmp"))

@@ -213,7 +213,10 @@ def _champion(plan: Plan, runner: Runner) -> Publication | None:
 
 def _start(plan: Plan, runner: Runner, champion: Publication | None) -> Source | None:
     """The weights that the training begins with: without a champion yet, from scratch."""
-    if champion is None or not plan.from_champion:
+    if not plan.from_champion:
+        return None
+    if champion is None:
+        runner.progress.note(f"{plan.name} has no champion yet: the training begins from scratch.")
         return None
     return source_of_version(runner.registry.record(champion))
 
@@ -251,7 +254,9 @@ def _publish(
 
     def body() -> dict[str, Any]:
         publication, known = _into_registry(runner, bundle, score, evaluation)
-        promoted, reason = runner.registry.consider(publication, score, rival_score, promote=plan.promote)
+        promoted, reason = runner.registry.consider(
+            publication, score, rival_score, who=runner.who, promote=plan.promote
+        )
         result = RegistryResult(
             reference=f"{publication.name}@{publication.version}",
             folder=str(runner.registry.folder(publication)),
@@ -269,7 +274,7 @@ def _publish_unscored(runner: Runner, bundle: Bundle) -> dict[str, Any]:
 
     def body() -> dict[str, Any]:
         publication, known = _into_registry(runner, bundle, None, {})
-        _, reason = runner.registry.consider(publication, None, None, promote=False)
+        _, reason = runner.registry.consider(publication, None, None, who=runner.who, promote=False)
         reference = f"{publication.name}@{publication.version}"
         result = {"reference": reference, "score": None, "champion": False, "reason": reason}
         return {"known": known, "result": result}

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, Self
 
-from pydantic import Field
+from pydantic import Field, ValidationError, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
+
+from schemas.problem import Problem
 
 
 class Settings(BaseSettings):
@@ -57,6 +60,23 @@ class Settings(BaseSettings):
     hosts: str = ""
     rate: float = Field(default=50.0, gt=0.0)
     burst: int = Field(default=200, ge=1)
+
+    def __init__(self, **values: Any) -> None:
+        try:
+            super().__init__(**values)
+        except ValidationError as error:
+            first = error.errors()[0]
+            name = "_".join(str(part) for part in first["loc"]).upper()
+            raise Problem(
+                f"DIAPHANE_{name} cannot be used: {first['msg']}." if name else f"{first['msg']}.",
+                "Correct that variable of the environment, or unset it.",
+            ) from error
+
+    @model_validator(mode="after")
+    def _patient(self) -> Self:
+        if self.ttl < 3.0 * self.heartbeat:
+            raise ValueError("DIAPHANE_TTL has to be at least three times DIAPHANE_HEARTBEAT")
+        return self
 
     @property
     def database_url(self) -> str:

@@ -116,6 +116,7 @@ class Runner(Protocol):
         registry: Where bundles are published.
         measured: Where measurements and data sets are kept.
         job_id: Of the job, None outside the service.
+        who: Id of the key that submitted it, None outside the service.
     """
 
     progress: Progress
@@ -124,6 +125,7 @@ class Runner(Protocol):
     registry: Registry
     measured: Measured
     job_id: str | None
+    who: str | None
 
     def map(self, stage: StageName, tasks: Sequence[Task]) -> list[Facts | None]:
         """Makes what is missing of a stage's artifacts.

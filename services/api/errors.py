@@ -13,6 +13,7 @@ from fastapi.responses import Response
 from sqlalchemy.exc import DBAPIError, InterfaceError, OperationalError
 from sqlalchemy.exc import TimeoutError as PoolTimeoutError
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
 from schemas.problem import Problem
 from services.api.routes import methods_of
@@ -55,6 +56,8 @@ def refusal_for(error: Exception) -> Refusal | None:
         return error
     if isinstance(error, Problem):
         return refusal_of(error)
+    if isinstance(error, ClientDisconnect):
+        return Refusal("malformed", "The connection ended before the body did.")
     if isinstance(error, RequestValidationError):
         return _invalid(error.errors())
     if isinstance(error, (OperationalError, InterfaceError, PoolTimeoutError)) or (
@@ -80,7 +83,15 @@ def install(app: FastAPI) -> None:
         return answer(refusal, request.scope)
 
     handler: Callable[[Request, Exception], Awaitable[Response]] = handle
-    for kind in (HTTPException, RequestValidationError, Refusal, Problem, DBAPIError, PoolTimeoutError):
+    for kind in (
+        HTTPException,
+        RequestValidationError,
+        Refusal,
+        Problem,
+        DBAPIError,
+        PoolTimeoutError,
+        ClientDisconnect,
+    ):
         app.add_exception_handler(kind, handler)
 
 

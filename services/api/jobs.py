@@ -9,16 +9,17 @@ from fastapi import APIRouter, Depends, Header, Query, Request, Response
 
 from schemas.job import JobKind, JobSpec, JobState, TaskState
 from schemas.problem import ExitCode, Problem
-from schemas.service import JobRecord, TaskRecord
+from schemas.service import JobRecord, KeyRecord, TaskRecord
 from services.api.answers import EventPage, JobPage, TaskPage
 from services.api.body import JsonBody
 from services.api.feeds import LISTENERS, Feeds
 from services.api.pages import LINK_HEADER, MOMENT, TASK_PLACE, Page
 from services.api.parts import JobId, NameQuery, Services
 from services.api.places import moment, position
-from services.api.security import Caller, Needs
+from services.api.security import Caller, Needs, require_scope
 from services.api.streams import EventStream
 from services.database import tables
+from services.keys import allows
 from services.problems import Refusal
 from services.service import Service
 
@@ -53,12 +54,26 @@ def submit_job(
 ) -> JobRecord:
     """Submits a job."""
     _require_accepted(service, body)
+    spec = _within_scope(body, caller)
     record, new = service.jobs.submit(
-        body, submitted_by=caller.id, idempotency_key=idempotency_key, request_id=request.state.request_id
+        spec, submitted_by=caller.id, idempotency_key=idempotency_key, request_id=request.state.request_id
     )
     response.headers["Location"] = f"/v1/jobs/{record.id}"
     response.status_code = 202 if new else 200
     return record
+
+
+def _within_scope(spec: JobSpec, key: KeyRecord) -> JobSpec:
+    """What a key may ask for: without the scope `publish`, a better version stays a candidate.
+
+    Raises:
+        Refusal: A promotion is asked for in so many words, and the key may not.
+    """
+    if spec.kind != "build" or spec.promote == "never" or allows(key, "publish"):
+        return spec
+    if "promote" in spec.model_fields_set:
+        require_scope(key, "publish")
+    return spec.model_copy(update={"promote": "never"})
 
 
 @router.get("", responses={200: {"headers": LINK_HEADER}})

@@ -51,9 +51,9 @@ def serve(
     listener = _Listener(service, host, port)
     try:
         listener.start()
+        listener.wait_ready()  # before any work is claimed: it may be that it cannot listen
         if runtime is not None:
             runtime.start()
-        listener.wait_ready()
         announce(host, listener.port)
         while not stop.wait(0.5) and listener.is_alive():
             pass
@@ -119,7 +119,7 @@ def show_first_key(service: Service, host: str) -> None:
     if not is_loopback(host):
         raise Problem(
             f"The service has no API key yet, and {host} can be reached from elsewhere.",
-            "Make a key with `diaphane keys create` on this machine, or start it once on 127.0.0.1.",
+            "Make one on this machine: diaphane keys create NAME --scope admin --local.",
             ExitCode.AUTH,
         )
     _, secret = service.keys.create(FIRST_KEY, ("admin",))

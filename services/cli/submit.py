@@ -130,7 +130,7 @@ def job_spec(fields: Mapping[str, Any]) -> dict[str, Any]:
     from schemas.job import JobSpec
 
     try:
-        return JobSpec.model_validate_json(json.dumps(fields)).model_dump(mode="json")
+        return JobSpec.model_validate_json(json.dumps(fields)).model_dump(mode="json", exclude_unset=True)
     except ValidationError as error:
         faults = [_fault(detail) for detail in error.errors(include_url=False, include_input=False)]
         raise Problem(f"This is no job: {'; '.join(faults)}.", "Change those options.") from None

@@ -26,6 +26,7 @@ from services.database import tables
 T = TypeVar("T")
 
 PATIENCE_SECONDS = 60.0
+START_PATIENCE_SECONDS = 15.0
 _writers: defaultdict[str, threading.Lock] = defaultdict(threading.Lock)
 """SQLite lets waiting writers try again at intervals, and some starve: those of a process take turns by a lock."""
 _OPTIONS = "-c statement_timeout=30000 -c idle_in_transaction_session_timeout=15000"
@@ -106,7 +107,15 @@ class Database:
                     ExitCode.CONFLICT,
                 )
 
-        self.retry(make)
+        try:
+            self.retry(make, START_PATIENCE_SECONDS)
+        except OperationalError as error:
+            raise Problem(
+                f"The database at {self.engine.url.host or self.engine.url.database} cannot be used: "
+                f"{str(error.orig).splitlines()[0][:200]}.",
+                "See to the server that DIAPHANE_DATABASE names, then start again.",
+                ExitCode.TRY_AGAIN,
+            ) from error
 
     def close(self) -> None:
         """Closes all connections."""
@@ -126,7 +135,8 @@ def open_database(url: str) -> Database:
 
 def _engine(url: str) -> sa.Engine:
     if url.startswith("sqlite:///"):
-        Path(url.removeprefix("sqlite:///")).parent.mkdir(parents=True, exist_ok=True)
+        # Scenes and hashes of keys are nobody else's business; a folder that exists keeps its rights.
+        Path(url.removeprefix("sqlite:///")).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         engine = sa.create_engine(
             url,
             hide_parameters=True,

@@ -78,6 +78,7 @@ class DurableRunner:
         claim: Of the workflow that conducts the job.
         job_id: The job.
         attempt: Which attempt it is.
+        who: Id of the key that submitted the job.
         database: The database.
         tasks: Transitions of tasks.
         claims: What runs in this process.
@@ -91,6 +92,7 @@ class DurableRunner:
         claim: Claim,
         job_id: str,
         attempt: int,
+        who: str,
         *,
         database: Database,
         tasks: Tasks,
@@ -100,6 +102,7 @@ class DurableRunner:
         measured: Measured,
     ) -> None:
         self.job_id: str | None = job_id
+        self.who: str | None = who
         self.store, self.blobs = storage.store, storage.blobs
         self.registry, self.measured = registry, measured
         self.progress = JobProgress(database, job_id, self._once)
@@ -128,11 +131,23 @@ class DurableRunner:
                 "Look into the store: is its disk failing, or is something else removing files?",
                 ExitCode.TRY_AGAIN,
             )
+        if all(found is None for found in facts.values()):
+            self._refuse(stage)
         self._count_skips(stage, tasks)
         skips = dict(self.progress.skips)
         ended = {**told, "what": "ended", "quarantined": sum(found is None for found in facts.values())}
         self._once(f"end {stage}", lambda: states.note(self._database, self._id, ("stage", ended), skipped=skips))
         return [facts[task.name] for task in tasks]
+
+    def _refuse(self, stage: StageName) -> None:
+        """Ends the job with the reason of a task, where every task of a stage failed.
+
+        Raises:
+            Problem: Always.
+        """
+        document = self._tasks.first_problem(self._id, stage)
+        detail = document.detail or document.title
+        raise Problem(f"The stage {stage} failed: {detail}", document.remedy, ExitCode.CHECK_FAILED)
 
     def step(self, name: str, body: Callable[[], Any]) -> Any:
         """See `services.tasks.Runner`; a problem is remembered as well as a result.

@@ -221,6 +221,7 @@ class Runtime:
             claim,
             row.id,
             row.attempt,
+            row.submitted_by,
             database=self._database,
             tasks=self._tasks,
             claims=self._claims,

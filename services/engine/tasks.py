@@ -412,6 +412,14 @@ class Tasks:
         here = [tables.tasks.c.job_id == row.job_id, tables.tasks.c.position == row.position]
         connection.execute(tables.tasks.update().where(*here).values(**values))
 
+    def first_problem(self, job_id: str, stage: str) -> ProblemDocument:
+        """Why a task of a stage was quarantined, the first of them."""
+        table = tables.tasks
+        here = [table.c.job_id == job_id, table.c.stage == stage, table.c.state == "quarantined"]
+        query = sa.select(table.c.problem).where(*here).order_by(table.c.position).limit(1)
+        with self._database.read() as connection:
+            return ProblemDocument.model_validate(connection.scalar(query))
+
     def _quarantine(self, connection: sa.Connection, row: sa.Row[Any], problem: ProblemDocument) -> None:
         document = problem.model_dump(mode="json")
         here = [tables.tasks.c.job_id == row.job_id, tables.tasks.c.position == row.position]

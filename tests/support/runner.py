@@ -57,6 +57,7 @@ class TableRunner:
     def __init__(self, champion: Any = None, fails: Sequence[tuple[str, str]] = ()) -> None:
         self.progress = SilentProgress()
         self.job_id: str | None = "job_0"
+        self.who: str | None = "key_0"
         self.fails = set(fails)
         self.opaque: set[str] = set()
         self.empty: set[str] = set()
@@ -136,7 +137,9 @@ class TableRunner:
         self.published.append({"name": name, "folder": folder, "score": score, "evaluation": evaluation, **more})
         return SimpleNamespace(name=name, version="1.0.0", digest="e" * 64)
 
-    def _consider(self, publication: Any, score: float | None, rival: float | None, promote: bool) -> tuple[bool, str]:
+    def _consider(
+        self, publication: Any, score: float | None, rival: float | None, who: str | None, promote: bool
+    ) -> tuple[bool, str]:
         self.considered.append((score, rival, promote))
         return promote, "because"
 

@@ -85,6 +85,15 @@ def test_a_view_that_fails_to_the_end_is_left_out_and_the_rest_goes_on() -> None
     assert [count for _, count, model in runner.recorded if model] == [1], "the view with both pictures"
 
 
+def test_a_training_without_a_champion_to_start_from_says_so() -> None:
+    runner = TableRunner()
+    said: list[str] = []
+    runner.progress.note = said.append  # type: ignore[method-assign]
+    run(runner, spec(start_from="champion"))
+    assert runner.of("train")[0].bundle is None
+    assert any("no champion yet" in text for text in said)
+
+
 def test_a_stage_that_fails_everywhere_ends_the_job_with_what_to_do() -> None:
     runner = TableRunner(fails=[("train", "glass")])
     with pytest.raises(Problem, match="train failed for its 1 task") as caught:

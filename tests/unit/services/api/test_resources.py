@@ -215,3 +215,34 @@ def test_a_shard_is_read_from_the_artifact_it_lies_in(api: Api) -> None:
     answer = api.get(f"/v1/datasets/{dataset.id}/shards/{sha256}")
     assert answer.status_code == 404
     assert "again" in answer.json()["remedy"]
+
+
+def _job(**changes: Any) -> dict[str, Any]:
+    return {"kind": "build", "name": "glass", "width": 64, "height": 48, **changes}
+
+
+@pytest.mark.parametrize(
+    ("scope", "asked", "status", "promote"),
+    [
+        ("submit", None, 202, "never"),
+        ("submit", "never", 202, "never"),
+        ("submit", "if-better", 403, None),
+        ("admin", None, 202, "if-better"),
+        ("admin", "if-better", 202, "if-better"),
+    ],
+)
+def test_a_promotion_needs_the_scope_for_it(
+    api: Api, scope: str, asked: str | None, status: int, promote: str | None
+) -> None:
+    body = _job(scenes=[{"scene": api.scene()}], **({} if asked is None else {"promote": asked}))
+    answer = api.post("/v1/jobs", scope, json=body)
+    assert answer.status_code == status, answer.text
+    if promote is not None:
+        assert answer.json()["spec"]["promote"] == promote
+
+
+def test_a_view_without_direction_is_refused_at_once(api: Api) -> None:
+    view = {"eye": [0, 0, 1], "target": [0, 0, 1], "up": [0, 1, 0], "fov": 40}
+    answer = api.post("/v1/jobs", json=_job(scenes=[{"scene": "scn_" + "0" * 32, "views": [view]}]))
+    assert answer.status_code == 422
+    assert "no direction" in answer.text

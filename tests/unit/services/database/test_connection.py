@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import threading
+from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
@@ -68,3 +69,16 @@ def test_writers_wait_for_each_other(database_url: str) -> None:
 def test_an_unknown_scheme_says_what_to_set() -> None:
     with pytest.raises(Problem, match="DIAPHANE_DATABASE"):
         Database("mysql://somewhere/else")
+
+
+def test_a_server_that_cannot_be_reached_is_named_without_its_password(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("services.database.connection.START_PATIENCE_SECONDS", 0.3)
+    with pytest.raises(Problem, match=r"127\.0\.0\.1 cannot be used") as caught:
+        open_database("postgresql://somebody:hidden-word@127.0.0.1:1/none")
+    assert "hidden-word" not in str(caught.value)
+    assert "DIAPHANE_DATABASE" in caught.value.remedy
+
+
+def test_a_new_folder_is_its_owners_alone(tmp_path: Path) -> None:
+    open_database(f"sqlite:///{tmp_path / 'state' / 'x.sqlite'}").close()
+    assert (tmp_path / "state").stat().st_mode & 0o077 == 0
