@@ -130,10 +130,13 @@ def job_spec(fields: Mapping[str, Any]) -> dict[str, Any]:
     from schemas.job import JobSpec
 
     try:
-        return JobSpec.model_validate_json(json.dumps(fields)).model_dump(mode="json", exclude_unset=True)
+        spec = JobSpec.model_validate_json(json.dumps(fields))
     except ValidationError as error:
         faults = [_fault(detail) for detail in error.errors(include_url=False, include_input=False)]
         raise Problem(f"This is no job: {'; '.join(faults)}.", "Change those options.") from None
+    # What is not said of a promotion is decided by what the key may do.
+    unsaid = {"promote"} - spec.model_fields_set
+    return spec.model_dump(mode="json", exclude=unsaid)
 
 
 def _fault(detail: Any) -> str:

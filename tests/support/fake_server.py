@@ -14,6 +14,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 from urllib.parse import parse_qs, urlencode, urlsplit
 
+from schemas.job import JobSpec
+
 KEY = "dia_0123456789ab_" + "k" * 43
 NOW = "2026-03-01T12:00:00.000000Z"
 PART_BYTES = 1000
@@ -200,7 +202,8 @@ def _scene(server: FakeServer, _: Asked, scene_id: str) -> tuple[int, JSON]:
 
 
 def _submit(server: FakeServer, asked: Asked) -> tuple[int, JSON]:
-    spec, key = json.loads(asked.body), asked.headers["idempotency-key"]
+    spec = JobSpec.model_validate_json(asked.body).model_dump(mode="json")
+    key = asked.headers["idempotency-key"]
     if key in server.keys_of_jobs:
         return 200, server.jobs[server.keys_of_jobs[key]]
     job_id = f"job_{len(server.jobs):024x}"
