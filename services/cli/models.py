@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
@@ -153,18 +153,13 @@ class _Local:
 
     def __init__(self, state: Path) -> None:
         # Imported late: `diaphane --help` needs no database.
-        from services.database import open_database
-        from services.registry import open_registry
-        from services.settings import Settings
-        from services.storage import open_storage
+        from services.local import open_local
 
-        # As in `diaphane build`: a local registry is that of its folder, whatever the environment names.
-        settings = Settings(state=state, database="", store="", cache="")
-        self._database = open_database(settings.database_url)
-        self._registry: Registry = open_registry(self._database, open_storage(settings).blobs, settings)
+        self._open = ExitStack()
+        self._registry: Registry = self._open.enter_context(open_local(state)).registry
 
     def close(self) -> None:
-        self._database.close()
+        self._open.close()
 
     def models(self) -> list[dict[str, Any]]:
         return [model.model_dump(mode="json") for model in self._registry.models()]

@@ -60,25 +60,14 @@ def pack(path: Path, name: str | None = None) -> Package:
 def _dependencies(path: Path) -> tuple[set[Path], set[Path]]:
     """Files that the root layer depends on, and those of them that are missing."""
     try:
-        from pxr import Tf, UsdUtils
-
-        from renderer.usd.materialx import referenced_files
-        from renderer.usd.stage import WarningLog, usd_diagnostics
+        from renderer.usd.digest import dependencies
     except ImportError as error:
         raise Problem(
             f"What {path} consists of cannot be found out without OpenUSD.",
             "Install usd-core, or pack the scene into one .usdz file.",
         ) from error
     root = path.resolve()
-    try:
-        with usd_diagnostics(WarningLog()):
-            layers, assets, unresolved = UsdUtils.ComputeAllDependencies(str(root))
-    except Tf.ErrorException as error:
-        raise Problem(f"{path} cannot be read as USD.", "Export it again.") from error
-    # A file inside a package (`x.usdz[y.png]`) is the package's.
-    names = [layer.realPath or layer.identifier for layer in layers] + [str(asset) for asset in assets]
-    files = [Path(str(name).split("[", 1)[0]) for name in (*names, *unresolved)]
-    files += [image for file in files if file.suffix.lower() == ".mtlx" for image in referenced_files(file)]
+    files = dependencies(path)
     # Names are made by the path as written: a link keeps its name, and is sent as the file that it leads to.
     absolute = {Path(os.path.abspath(root.parent / file)) for file in files}  # noqa: PTH100 - resolve follows links
     found = {file for file in absolute if file.is_file()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ipaddress
 import os
 import sys
 import threading
@@ -114,6 +113,8 @@ def show_first_key(service: Service, host: str) -> None:
     Raises:
         Problem: There is no key, and others than this machine could reach the service.
     """
+    from services.api.server import is_loopback
+
     if service.keys.any():
         return
     if not is_loopback(host):
@@ -124,16 +125,6 @@ def show_first_key(service: Service, host: str) -> None:
         )
     _, secret = service.keys.create(FIRST_KEY, ("admin",))
     print(f"First API key (admin), shown only now:\n  {secret}\nUse it: export DIAPHANE_KEY={secret}", flush=True)
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this machine can reach an address."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
 
 
 def announce(host: str, port: int) -> None:

@@ -47,10 +47,6 @@ class Desk:
         (needed,) = (need for need in task.needs if need.startswith(f"{stage}/"))
         return self.store.fetch(needed)
 
-    def facts(self, artifact: str) -> Facts:
-        """Facts of an artifact."""
-        return load_facts(self.store.fetch(artifact))
-
     def scene_path(self, task: Task) -> Path:
         """The file that a task's scene is opened from."""
         source = _present(task.scene, task)

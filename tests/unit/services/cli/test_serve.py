@@ -3,7 +3,8 @@ from __future__ import annotations
 import pytest
 
 from schemas.problem import ExitCode, Problem
-from services.cli.serve import is_loopback, show_first_key
+from services.api.server import is_loopback
+from services.cli.serve import show_first_key
 from services.cli.worker import parse_roles
 
 
