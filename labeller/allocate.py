@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labeller.allocation import Allocation, RuleName, measured
-from labeller.baselines import FillName, dynamic, fixed, weighted
+from labeller.baselines import FillName, fixed, weighted
 from labeller.curves import Curves
 from labeller.greedy import Removals
 from labeller.hull import Hulls, lower_hulls
 from labeller.optimal import LagrangianAllocator
+from renderer.allocation.dynamic import dynamic
 from renderer.allocation.fill import feasible_k_min
 from renderer.allocation.importance import VkbOptions
 from schemas.fragments import FragmentDump

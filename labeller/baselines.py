@@ -20,15 +20,6 @@ def fixed(n: NDArray[np.integer], budget: int) -> NDArray[np.int32]:
     return np.asarray(np.minimum(budget // max(len(n), 1), n), dtype=np.int32)
 
 
-def dynamic(n: NDArray[np.integer], budget: int) -> NDArray[np.int32]:
-    """int32 [P]: the k+-buffer, the largest k for all pixels with `sum min(k, n) <= F`; clipped to n."""
-    # At least j fragments have deeper[j] pixels, so going from k = j to j + 1 costs deeper[j + 1].
-    histogram = np.bincount(np.asarray(n, dtype=np.int64), minlength=1)
-    deeper = histogram[::-1].cumsum()[::-1]
-    k = int(np.searchsorted(np.cumsum(deeper[1:]), budget, side="right"))
-    return np.asarray(np.minimum(k, n), dtype=np.int32)
-
-
 def weighted(
     dump: FragmentDump, rule: WeightRule, budget: int, k_min: int, options: VkbOptions, fill: FillName
 ) -> NDArray[np.int32]:

@@ -1,6 +1,8 @@
 """Binary glTF (.glb) to USD: geometry, transforms, base colour and opacity, which is all that is rendered.
 
-The same file makes the same bytes, whenever and wherever it is converted.
+The same file makes the same bytes, whenever and wherever it is converted. This is the way of files that somebody else
+uploaded: what is read of them has passed `renderer.gate`, byte by byte, and no library parses them. Files of one's own,
+of any format that trimesh reads, go through `renderer.convert_meshes`.
 """
 
 from __future__ import annotations
@@ -8,20 +10,23 @@ from __future__ import annotations
 import hashlib
 import shutil
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
+from renderer.authoring import COORDINATES, Geometry, Image, Look, write_material, write_mesh
 from renderer.gate.gltf import GlbContent, Object, damaged, floats, read_glb, walk_nodes
 from renderer.gate.images import PNG
+from schemas.scene import Wrap
 
 VERSION = "1"
 """Changes whenever the same file is converted to something else."""
 TRIANGLES, STRIP, FAN = 4, 5, 6
-WRAPS = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
+WRAPS: dict[int, Wrap] = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
 
 
 def stage_file(folder: Path, root: str, cache: Path) -> Path:
@@ -100,30 +105,24 @@ class _Converter:
             indices = content.array(primitive["indices"])[:, 0].astype(np.int32)
         else:
             indices = np.arange(len(points), dtype=np.int32)
-        faces = _triangles(indices, primitive.get("mode", TRIANGLES))
-        mesh = UsdGeom.Mesh.Define(self._stage, path)
-        mesh.CreatePointsAttr(_vectors(points, Vt.Vec3fArray))
-        mesh.CreateExtentAttr(_vectors(np.stack((points.min(axis=0), points.max(axis=0))), Vt.Vec3fArray))
-        mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(faces), 3, dtype=np.int32)))
-        mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(faces).ravel()))
-        mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
-        if "NORMAL" in attributes:
-            mesh.CreateNormalsAttr(_vectors(self._unit(attributes["NORMAL"], 3), Vt.Vec3fArray))
-            mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
-        self._primvars(UsdGeom.PrimvarsAPI(mesh), attributes)
         index = primitive.get("material")
         material = {} if index is None else content.pick("materials", index)
-        mesh.CreateDoubleSidedAttr(bool(material.get("doubleSided", False)))
+        geometry = Geometry(
+            points=points,
+            faces=_triangles(indices, primitive.get("mode", TRIANGLES)),
+            normals=self._unit(attributes["NORMAL"], 3) if "NORMAL" in attributes else None,
+            coordinates=dict(self._coordinates(attributes)),
+            is_double_sided=bool(material.get("doubleSided", False)),
+        )
+        mesh = write_mesh(self._stage, path, geometry)
         UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(self._material(index, material))
 
-    def _primvars(self, api: UsdGeom.PrimvarsAPI, attributes: Object) -> None:
+    def _coordinates(self, attributes: Object) -> Iterator[tuple[str, NDArray[np.float64]]]:
         for number in (0, 1):
             if f"TEXCOORD_{number}" in attributes:
                 uv = self._unit(attributes[f"TEXCOORD_{number}"], 2)
-                uv = np.column_stack((uv[:, 0], 1.0 - uv[:, 1]))  # glTF's v goes down
-                primvar = api.CreatePrimvar(f"st{number or ''}", Sdf.ValueTypeNames.TexCoord2fArray)
-                primvar.SetInterpolation(UsdGeom.Tokens.vertex)
-                primvar.Set(_vectors(uv, Vt.Vec2fArray))
+                # glTF's v goes down
+                yield f"{COORDINATES}{number or ''}", np.column_stack((uv[:, 0], 1.0 - uv[:, 1]))
 
     def _unit(self, index: Any, width: int) -> NDArray[np.float64]:
         """An accessor's values, normalised where they are integers."""
@@ -139,55 +138,33 @@ class _Converter:
         if index in self._materials:
             return self._materials[index]
         name = "Default" if index is None else f"Material{index}"
-        made = UsdShade.Material.Define(self._stage, f"/World/Looks/{name}")
-        shader = UsdShade.Shader.Define(self._stage, made.GetPath().AppendChild("Surface"))
-        shader.CreateIdAttr("UsdPreviewSurface")
-        made.CreateSurfaceOutput().ConnectToSource(shader.CreateOutput("surface", Sdf.ValueTypeNames.Token))
         metal = material.get("pbrMetallicRoughness", {})
         if not isinstance(metal, dict):
             raise damaged(self._content.name)
         factor = floats(self._content.name, metal.get("baseColorFactor", (1, 1, 1, 1)), 4).clip(0.0, 1.0)
         mode = material.get("alphaMode", "OPAQUE")
-        colour = shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
-        opacity = shader.CreateInput("opacity", Sdf.ValueTypeNames.Float)
-        texture = metal.get("baseColorTexture")
-        if texture is None:
-            colour.Set(Gf.Vec3f(*factor[:3].tolist()))
-            opacity.Set(1.0 if mode == "OPAQUE" else float(factor[3]))
-        else:
-            reader = self._texture(made.GetPath(), texture, factor)
-            colour.ConnectToSource(reader.CreateOutput("rgb", Sdf.ValueTypeNames.Float3))
-            if mode == "OPAQUE":
-                opacity.Set(1.0)
-            else:
-                opacity.ConnectToSource(reader.CreateOutput("a", Sdf.ValueTypeNames.Float))
+        cutoff = None
         if mode == "MASK":
-            cutoff = floats(self._content.name, [material.get("alphaCutoff", 0.5)], 1)[0]
-            shader.CreateInput("opacityThreshold", Sdf.ValueTypeNames.Float).Set(float(cutoff))
-        self._materials[index] = made
-        return made
+            cutoff = float(floats(self._content.name, [material.get("alphaCutoff", 0.5)], 1)[0])
+        texture = metal.get("baseColorTexture")
+        look = Look(
+            base=(float(factor[0]), float(factor[1]), float(factor[2]), float(factor[3])),
+            image=None if texture is None else self._texture(texture),
+            is_opaque=mode == "OPAQUE",
+            cutoff=cutoff,
+        )
+        self._materials[index] = write_material(self._stage, Sdf.Path(f"/World/Looks/{name}"), look)
+        return self._materials[index]
 
-    def _texture(self, home: Sdf.Path, reference: Any, factor: NDArray[np.float64]) -> UsdShade.Shader:
-        """The reader of a base colour texture, with its coordinates."""
+    def _texture(self, reference: Any) -> Image:
+        """A base colour texture and how it is sampled."""
         if not isinstance(reference, dict):
             raise damaged(self._content.name)
         texture = self._content.pick("textures", reference.get("index"))
-        reader = UsdShade.Shader.Define(self._stage, home.AppendChild("BaseColour"))
-        reader.CreateIdAttr("UsdUVTexture")
-        reader.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(self._image(texture.get("source")))
-        reader.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")
-        reader.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(*factor.tolist()))
         sampler = self._content.pick("samplers", texture["sampler"]) if "sampler" in texture else {}
-        for side in ("S", "T"):
-            wrap = WRAPS.get(sampler.get(f"wrap{side}", 10497), "repeat")
-            reader.CreateInput(f"wrap{side}", Sdf.ValueTypeNames.Token).Set(wrap)
-        coordinates = UsdShade.Shader.Define(self._stage, home.AppendChild("Coordinates"))
-        coordinates.CreateIdAttr("UsdPrimvarReader_float2")
-        name = "st1" if reference.get("texCoord", 0) == 1 else "st"
-        coordinates.CreateInput("varname", Sdf.ValueTypeNames.String).Set(name)
-        output = coordinates.CreateOutput("result", Sdf.ValueTypeNames.Float2)
-        reader.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(output)
-        return reader
+        wraps = [WRAPS.get(sampler.get(f"wrap{side}", 10497), "repeat") for side in "ST"]
+        name = f"{COORDINATES}1" if reference.get("texCoord", 0) == 1 else COORDINATES
+        return Image(self._image(texture.get("source")), (wraps[0], wraps[1]), name)
 
     def _image(self, index: Any) -> str:
         """Writes an image as it is, and how the stage names it."""
@@ -208,7 +185,3 @@ def _triangles(indices: NDArray[np.int32], mode: int) -> NDArray[np.int32]:
     strip = np.column_stack((indices[:-2], indices[1:-1], indices[2:]))
     strip[1::2] = strip[1::2, ::-1]
     return strip
-
-
-def _vectors(values: NDArray[Any], kind: Any) -> Any:
-    return kind.FromNumpy(np.ascontiguousarray(values, dtype=np.float32))

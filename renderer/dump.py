@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import zarr
@@ -18,15 +20,16 @@ _CHUNK = 1 << 23
 _ARRAYS = ("rgba", "depth", "background", "facing")
 
 
-def write_dump(folder: Path, dump: FragmentDump) -> None:
+def write_dump(folder: Path, dump: FragmentDump, about: Mapping[str, Any] | None = None) -> None:
     """Write a dump as `folder/fragments.zarr`; n(p) is stored, the offsets follow from it.
 
     Args:
         folder: An existing folder.
         dump: The fragments of a view.
+        about: Further attributes of the group, JSON: what the view was.
     """
     group = zarr.open_group(folder / "fragments.zarr", mode="w")
-    group.attrs.update({"width": dump.width, "height": dump.height})
+    group.attrs.update({**(about or {}), "width": dump.width, "height": dump.height})
     _write(group, "counts", dump.counts.astype(np.uint32))
     for name in _ARRAYS:
         _write(group, name, getattr(dump, name))

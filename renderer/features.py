@@ -11,6 +11,7 @@ Colours are the stored gamma-2 values / 255, alphas the stored values / 255, `x`
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Final
 
@@ -58,6 +59,16 @@ FEATURES_GLSL: Final[dict[str, str]] = {
 
 FEATURES: Final[tuple[str, ...]] = tuple(FEATURES_GLSL)
 """Columns of the derived features, in this order. A bundle's manifest lists those its model reads."""
+
+
+def texels_of(names: Sequence[str]) -> frozenset[int]:
+    """The texels of `SUMS` that features read: what a gather pass has to leave for them.
+
+    Args:
+        names: Members of `FEATURES`.
+    """
+    read = {(int(texel), c) for name in names for texel, c in re.findall(r"s\[(\d)\]\.(\w)", FEATURES_GLSL[name])}
+    return frozenset(texel for texel, _ in read - {(3, "w"), (4, "w")})  # the depth range is the count pass's
 
 
 def features_glsl(names: Sequence[str] = FEATURES) -> str:

@@ -22,7 +22,16 @@ from schemas.view import View
 RGB = tuple[float, float, float]
 
 Gather = Literal["gather-tail", "gather-nearest", "gather"]
-"""What a gather pass leaves: the tail's sums; also the nearest fragment; also all other sums. Names of the passes."""
+"""What a gather pass leaves: the tail's sums; also the nearest fragment; what a predictor reads. Names of passes."""
+
+NEAREST = 5
+"""The texel of `renderer.features.SUMS` that is the nearest fragment; those before it are sums by blending."""
+ALL_TEXELS = frozenset(range(NEAREST + 1))
+_TEXELS: dict[Gather, frozenset[int]] = {
+    "gather-tail": frozenset({0}),
+    "gather-nearest": frozenset({0, NEAREST}),
+    "gather": ALL_TEXELS,
+}
 
 # Shader storage bindings that several passes share.
 COUNT, Z_MIN, Z_MAX, NEAREST_COLOUR, NEAREST_FACING = range(5)
@@ -33,14 +42,22 @@ class Gathered:
     """Order-independent sums of a frame, on the GPU.
 
     Attributes:
-        sums: RGBA32F textures: `gather/gather.frag` says what each holds; five of a `gather`, else the first.
+        name: Of the pass.
+        sums: RGBA32F textures, five: `gather/gather.frag` says what each holds. Where one was not asked for, the first
+            stands in its place.
         nearest_colour: uint32 [P], packed colour of the nearest fragment, all ones where none; None if not gathered.
         nearest_facing: uint32 [P], its |n . e| * 255; None if not gathered.
     """
 
+    name: Gather
     sums: list[moderngl.Texture]
     nearest_colour: moderngl.Buffer | None = None
     nearest_facing: moderngl.Buffer | None = None
+
+    @property
+    def pixel_bytes(self) -> int:
+        """Bytes a pixel of all this."""
+        return 16 * len({texture.glo for texture in self.sums}) + (8 if self.nearest_colour is not None else 0)
 
 
 @dataclass(slots=True)
@@ -69,6 +86,9 @@ class Frame:
         width: Pixels per row.
         height: Rows; row 0 is at the top.
         clear: Linear RGB where no opaque surface is.
+
+    Attributes:
+        culled_triangles: Triangles outside the frustum, which no pass draws.
     """
 
     def __init__(self, gpu: GpuScene, view: View, width: int, height: int, clear: RGB = (1.0, 1.0, 1.0)) -> None:
@@ -81,30 +101,44 @@ class Frame:
         self.gpu, self.ctx, self.view = gpu, gpu.ctx, view
         self.width, self.height, self.pixels = width, height, width * height
         self.clock = Clock(self.ctx)
-        self.uniforms = self._camera()
+        self.uniforms, self._clip = self._camera()
+        self._visible, self.culled_triangles = gpu.clusters.visible(self._clip)
         self.background = self.ctx.texture((width, height), 4)
         self.background.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self.depth = self.ctx.depth_renderbuffer((width, height))
         self._counts: moderngl.Buffer | None = None
         self._range: tuple[moderngl.Buffer, moderngl.Buffer] | None = None
-        self._gathered: dict[Gather, Gathered] = {}
+        self._gathered: dict[tuple[Gather, frozenset[int]], Gathered] = {}
         self._count_array: NDArray[np.uint32] | None = None
         with self.clock.measure("opaque"):
             self._draw_opaque(clear)
 
-    def _camera(self) -> dict[str, object]:
+    def _camera(self) -> tuple[dict[str, object], NDArray[np.float64]]:
+        """What every geometry pass gets, and world to clip space."""
         to_view = self.view.world_to_view()
         near, far = self.view.clip_range(self.gpu.scene.bounds)
         projection = self.view.projection(self.width / self.height, near, far)
         projection[1] *= -1.0  # row 0 at the top
         up = to_view[:3, :3] @ np.array(self.gpu.scene.up)
-        return {
+        uniforms: dict[str, object] = {
             "world_to_view": tuple(to_view.T.astype(np.float32).ravel().tolist()),
             "projection": tuple(projection.T.astype(np.float32).ravel().tolist()),
-            "orthographic": self.view.ortho_height is not None,
+            "eye_ray": self._eye_ray(projection),
             "up_view": tuple(up.tolist()),
             "width": self.width,
         }
+        return uniforms, projection @ to_view
+
+    def _eye_ray(self, projection: NDArray[np.float64]) -> tuple[float, float, float, float]:
+        """Scale and offset from window coordinates to x/-z and y/-z in view space; all 0 for parallel rays.
+
+        With it a shader knows where the eye is without an interpolated position.
+        """
+        if self.view.ortho_height is not None:
+            return 0.0, 0.0, 0.0, 0.0
+        scale = 2.0 / (np.array([self.width, self.height]) * np.diag(projection)[:2])
+        offset = (projection[:2, 2] - 1.0) / np.diag(projection)[:2]
+        return float(scale[0]), float(scale[1]), float(offset[0]), float(offset[1])
 
     def target(self, colours: list[moderngl.Texture]) -> moderngl.Framebuffer:
         """A framebuffer with these attachments and the opaque depth."""
@@ -118,7 +152,7 @@ class Frame:
         target.clear(red, green, blue, 1.0, depth=1.0)
         self.ctx.enable_only(moderngl.DEPTH_TEST)
         target.depth_mask = True
-        self.gpu.draw("opaque/opaque.frag", OPAQUE, self.uniforms)
+        self.gpu.draw("opaque/opaque.frag", OPAQUE, self.uniforms, visible=self._visible)
 
     def draw_transparent(
         self,
@@ -126,6 +160,7 @@ class Frame:
         target: moderngl.Framebuffer,
         defines: Defines | None = None,
         scissor: tuple[int, int] | None = None,
+        ranked: bool = False,
         **uniforms: object,
     ) -> None:
         """Draw the transparent layers against the opaque depth, blending additively where there are attachments.
@@ -135,6 +170,7 @@ class Frame:
             target: From `target`.
             defines: Shader defines.
             scissor: First row and number of rows, or all.
+            ranked: As `GpuScene.draw` has it: the shader reads the order of submission.
             uniforms: Added to the camera's.
         """
         target.use()
@@ -143,7 +179,7 @@ class Frame:
         target.depth_mask = False
         self.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
         self.ctx.blend_func = moderngl.ONE, moderngl.ONE
-        self.gpu.draw(fragment, TRANSPARENT, {**self.uniforms, **uniforms}, defines)
+        self.gpu.draw(fragment, TRANSPARENT, {**self.uniforms, **uniforms}, defines, ranked, self._visible)
         self.ctx.enable_only(moderngl.NOTHING)
 
     def buffer(self, words: int, fill: int) -> moderngl.Buffer:
@@ -175,6 +211,11 @@ class Frame:
                 self._count_array = np.frombuffer(buffer.read(4 * self.pixels), dtype=np.uint32)
         return self._count_array
 
+    @property
+    def counted(self) -> bool:
+        """Whether n(p) is known already."""
+        return self._counts is not None
+
     def depth_range(self) -> tuple[moderngl.Buffer, moderngl.Buffer, moderngl.Buffer]:
         """Buffers of n, z_min and z_max (float bits), uint32 [P] each, on the GPU."""
         if self._counts is None or self._range is None:
@@ -186,28 +227,40 @@ class Frame:
             self.ctx.memory_barrier()
         return self._counts, *self._range
 
-    def gather(self, what: Gather) -> Gathered:
-        """The order-independent sums of every pixel, by one additive pass."""
-        if what not in self._gathered:
-            _, z_min, z_max = self.depth_range()
-            with self.clock.measure(what):
-                self._gathered[what] = self._gather(what, z_min, z_max)
-        return self._gathered[what]
+    def gather(self, what: Gather, texels: frozenset[int] | None = None) -> Gathered:
+        """The order-independent sums of every pixel, by one additive pass.
 
-    def _gather(self, what: Gather, z_min: moderngl.Buffer, z_max: moderngl.Buffer) -> Gathered:
-        full, nearest = what == "gather", what != "gather-tail"
-        made = Gathered([self.ctx.texture((self.width, self.height), 4, dtype="f4") for _ in range(5 if full else 1)])
+        Args:
+            what: Which pass.
+            texels: Of a `gather`: which texels of `renderer.features.SUMS` are read; None: all. The first, and the
+                nearest fragment's facing if its colour is asked for, are always there.
+        """
+        wanted = (_TEXELS[what] if texels is None else texels & _TEXELS[what]) | {0}
+        if (what, wanted) not in self._gathered:
+            _, z_min, z_max = self.depth_range()
+            self.clock.passes.pop(what, None)
+            with self.clock.measure(what):
+                self._gathered[what, wanted] = self._gather(what, wanted, z_min, z_max)
+        return self._gathered[what, wanted]
+
+    def _gather(self, what: Gather, texels: frozenset[int], z_min: moderngl.Buffer, z_max: moderngl.Buffer) -> Gathered:
+        blended = sorted(texels - {NEAREST})
+        made = {texel: self.ctx.texture((self.width, self.height), 4, dtype="f4") for texel in blended}
+        gathered = Gathered(what, [made.get(texel, made[0]) for texel in range(NEAREST)])
         z_min.bind_to_storage_buffer(Z_MIN)
         z_max.bind_to_storage_buffer(Z_MAX)
-        if nearest:
-            made.nearest_colour = self.buffer(self.pixels, 0xFFFFFFFF)
-            made.nearest_facing = self.buffer(self.pixels, 0)
-            made.nearest_colour.bind_to_storage_buffer(NEAREST_COLOUR)
-            made.nearest_facing.bind_to_storage_buffer(NEAREST_FACING)
-        target = self.target(made.sums)
-        for texture in made.sums:
+        if NEAREST in texels:
+            gathered.nearest_colour = self.buffer(self.pixels, 0xFFFFFFFF)
+            gathered.nearest_facing = self.buffer(self.pixels, 0)
+            gathered.nearest_colour.bind_to_storage_buffer(NEAREST_COLOUR)
+            gathered.nearest_facing.bind_to_storage_buffer(NEAREST_FACING)
+        for texture in made.values():
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
             self.ctx.framebuffer([texture]).clear(0.0, 0.0, 0.0, 0.0)
-        self.draw_transparent("gather/gather.frag", target, {"FULL": int(full), "NEAREST": int(nearest)})
+        # Each sum that is there has the next colour attachment.
+        places = {f"SUMS{texel}": place for place, texel in enumerate(blended) if texel}
+        self.draw_transparent(
+            "gather/gather.frag", self.target(list(made.values())), {**places, "NEAREST": int(NEAREST in texels)}
+        )
         self.ctx.memory_barrier()
-        return made
+        return gathered

@@ -43,12 +43,14 @@ class Programs:
             )
         return self._compiled[key]
 
-    def compute(self, name: str, texts: Mapping[str, str] | None = None) -> moderngl.ComputeShader:
+    def compute(
+        self, name: str, defines: Defines | None = None, texts: Mapping[str, str] | None = None
+    ) -> moderngl.ComputeShader:
         """The compute program of a file; `texts` are includes that are no files (a bundle's `predict.glsl`)."""
-        texts = texts or {}
-        key = (name, *sorted(texts.items()))
+        defines, texts = defines or {}, texts or {}
+        key = (name, *sorted(defines.items()), *sorted(texts.items()))
         if key not in self._computes:
-            self._computes[key] = self._ctx.compute_shader(expand(name, {}, texts))
+            self._computes[key] = self._ctx.compute_shader(expand(name, defines, texts))
         return self._computes[key]
 
 

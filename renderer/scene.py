@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,13 +11,15 @@ from numpy.typing import NDArray
 from pxr import Sdf, Tf, Usd, UsdGeom
 
 from renderer.usd.assemble import Placed, assemble
+from renderer.usd.bindings import bindings
 from renderer.usd.cameras import read_cameras
 from renderer.usd.digest import scene_digest
-from renderer.usd.instances import Draw, Walker
+from renderer.usd.geometry import read_shape
+from renderer.usd.instances import Draw, Walker, product
 from renderer.usd.materials import MaterialTable
-from renderer.usd.meshes import read_shape
-from renderer.usd.parts import Part, bindings, build_parts, canonical_path
-from renderer.usd.stage import WarningLog, open_stage, stage_time, usd_diagnostics, usd_reason
+from renderer.usd.parts import Part, build_parts
+from renderer.usd.shape import Reading
+from renderer.usd.stage import WarningLog, canonical_path, open_stage, stage_time, usd_diagnostics, usd_reason
 from renderer.usd.textures import TextureTable
 from schemas.problem import ExitCode, Problem
 from schemas.scene import SceneArrays
@@ -25,7 +28,13 @@ __all__ = ["LoadOptions", "load_scene", "scene_digest"]
 
 UP_AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 
+MAX_REFINE = 8
+"""Each level makes four times as many faces."""
+
 ShapeKey = tuple[Sdf.Path, ...]
+
+Watch = Callable[[Draw, Sequence[Part]], None]
+"""Is told of everything that is drawn, and of the parts of its shape."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,23 +46,31 @@ class LoadOptions:
             without a threshold is multiplied. None: as authored.
         time: Time code to read at; None: the start of the stage's range.
         variants: Selections `set=choice` (every prim that has the set) or `/prim/path:set=choice`.
+        refine: Levels of subdivision of meshes that have a scheme, 0 to MAX_REFINE; 0: their cages, as `usdrecord
+            --complexity low`.
     """
 
     alpha: float | None = None
     time: float | None = None
     variants: tuple[str, ...] = ()
+    refine: int = 0
 
     def __post_init__(self) -> None:
         if self.alpha is not None and not 0.0 < self.alpha <= 1.0:
             raise Problem(f"An alpha of {self.alpha} is not possible.", "Give a number above 0 and at most 1.")
+        if not 0 <= self.refine <= MAX_REFINE:
+            raise Problem(
+                f"Refining by {self.refine} levels is not possible.", f"Give a number from 0 to {MAX_REFINE}."
+            )
 
 
-def load_scene(path: Path, options: LoadOptions = LoadOptions()) -> SceneArrays:
+def load_scene(path: Path, options: LoadOptions = LoadOptions(), watch: Watch | None = None) -> SceneArrays:
     """Reads a USD file and everything it refers to.
 
     Args:
         path: A .usd, .usda, .usdc or .usdz file.
         options: Alpha, time and variants.
+        watch: For reports of what was found.
 
     Raises:
         Problem: The file is missing, is not USD, has no geometry, or has points that are not finite.
@@ -62,7 +79,7 @@ def load_scene(path: Path, options: LoadOptions = LoadOptions()) -> SceneArrays:
     try:
         with usd_diagnostics(log):
             stage = open_stage(path, options.variants)
-            scene = _StageReader(stage, path, options, log).read()
+            scene = _StageReader(stage, path, options, log, watch).read()
     except (Tf.ErrorException, UnicodeDecodeError) as error:
         # Also a damaged file's strings can have bytes that are no text.
         raise Problem(
@@ -74,11 +91,15 @@ def load_scene(path: Path, options: LoadOptions = LoadOptions()) -> SceneArrays:
 class _StageReader:
     """Reads one stage; the parts of each distinct shape are made once."""
 
-    def __init__(self, stage: Usd.Stage, path: Path, options: LoadOptions, log: WarningLog) -> None:
+    def __init__(
+        self, stage: Usd.Stage, path: Path, options: LoadOptions, log: WarningLog, watch: Watch | None
+    ) -> None:
         self._stage = stage
         self._path = path
         self._alpha = options.alpha
         self._log = log
+        self._watch = watch
+        self._refine = options.refine
         self._time = stage_time(stage, options.time)
         self._textures = TextureTable()
         self._materials = MaterialTable(self._time, self._textures, log)
@@ -95,6 +116,7 @@ class _StageReader:
             )
         arrays = assemble(placed)
         up = str(UsdGeom.GetStageUpAxis(self._stage))
+        cameras = read_cameras(self._stage, self._time, arrays.origin, self._metres, self._log)
         return SceneArrays(
             name=self._path.stem,
             positions=arrays.positions,
@@ -108,8 +130,9 @@ class _StageReader:
             bounds=arrays.bounds,
             up=UP_AXES.get(up, UP_AXES["Y"]),
             metres_per_unit=self._metres,
-            cameras=read_cameras(self._stage, self._time, arrays.origin, self._metres, self._log),
+            cameras=tuple(camera.view for camera in cameras),
             warnings=(),
+            more_uvs=arrays.more_uvs,
         )
 
     def _placed(self) -> list[Placed]:
@@ -118,31 +141,29 @@ class _StageReader:
         for draw in Walker(self._time, self._log).draws(self._stage):
             key = shape_key(draw)
             if key not in parts:
-                shape = read_shape(draw.prim, self._time, self._log)
+                reading = Reading(self._time, self._log, self._refine, draw.skin)
+                shape = read_shape(draw.prim, reading)
                 parts[key] = [] if shape is None else build_parts(draw.prim, shape, self._materials, self._alpha)
             matrices.setdefault(key, []).append(draw.matrices)
+            if self._watch is not None:
+                self._watch(draw, parts[key])
         scale = np.diag([self._metres, self._metres, self._metres, 1.0])
-        return [
-            Placed(part, np.concatenate(matrices[key]) @ scale)
-            for key, shape_parts in parts.items()
-            for part in shape_parts
-        ]
+        places = {key: product(np.concatenate(some), scale) for key, some in matrices.items()}
+        return [Placed(part, places[key]) for key, shape_parts in parts.items() for part in shape_parts]
 
 
 def shape_key(draw: Draw) -> ShapeKey:
-    """What decides how a prim looks: its place in its prototype, its materials and inherited display primvars.
+    """What decides how a prim looks: its place in its prototype, its pose, its materials and inherited primvars.
 
-    Instances of one prototype share the first, but may be bound to other materials or inherit other colours.
+    Instances of one prototype share the first, but may move otherwise, be bound to other materials or inherit other
+    colours.
     """
     prim = draw.prim
-    key = [canonical_path(prim)]
+    key = [canonical_path(prim), *(draw.skin.key if draw.skin is not None else ())]
     key += [path for path, _ in bindings(prim) if path is not None]
     if prim.IsInstanceProxy():
-        api = UsdGeom.PrimvarsAPI(prim)
-        for name in ("displayColor", "displayOpacity"):
-            primvar = api.FindPrimvarWithInheritance(name)
-            if primvar:
-                key.append(canonical_path(primvar.GetAttr().GetPrim()).AppendProperty(primvar.GetAttr().GetName()))
+        for primvar in UsdGeom.PrimvarsAPI(prim).FindInheritablePrimvars():
+            key.append(canonical_path(primvar.GetAttr().GetPrim()).AppendProperty(primvar.GetAttr().GetName()))
     return tuple(key)
 
 

@@ -18,6 +18,13 @@ Floats = NDArray[np.float64]
 
 ASPECT = 1.5
 """Width / height that sampled views are framed for; 1430x960 is close to it."""
+FRAMING_ASPECT = 20.955 / 15.2908
+"""Width / height of `framing_view`."""
+_DEFAULT_APERTURE, _DEFAULT_FOCAL = (20.955, 15.2908), 50.0
+"""Of a UsdGeomCamera: millimetres."""
+_FRAMING_TURN, _FRAMING_ELEVATION = 25.0, 20.0
+"""Degrees."""
+_FRAMING_MARGIN = 1.02
 SAMPLED_POINTS = 4096
 """Vertices that stand for the geometry when views are sampled."""
 
@@ -101,18 +108,38 @@ def sampled_views(scene: SceneArrays, count: int, seed: int) -> tuple[View, ...]
     return tuple(views)
 
 
+def framing_view(scene: SceneArrays) -> View:
+    """The whole scene, seen from the front, a little from above and beside, so that no side is seen edge-on.
+
+    The lens is that of `usdrecord` for a stage without cameras (and of a new UsdGeomCamera); it stands straight in
+    front of the bounds, which shows nothing of a plane along the view axis.
+    """
+    up = int(np.argmax(np.abs(np.array(scene.up))))
+    # The front is +z where y is up, and -y where z is.
+    azimuth = np.radians(_FRAMING_TURN - (90.0 if up == 2 else 0.0))
+    back = _direction(scene.up, float(azimuth), float(np.radians(_FRAMING_ELEVATION)))
+    half = 0.5 * _DEFAULT_APERTURE[1] / _DEFAULT_FOCAL
+    centre = 0.5 * (scene.bounds[0] + scene.bounds[1])
+    distance = _FRAMING_MARGIN * float(_needed(_sample_points(scene) - centre, back, scene, half, FRAMING_ASPECT).max())
+    fov = 2.0 * float(np.degrees(np.arctan(half)))
+    return _view("whole", centre + max(distance, 1e-6) * back, centre, scene, fov)
+
+
+def _needed(offset: Floats, back: Floats, scene: SceneArrays, half: float, aspect: float) -> Floats:
+    """How far along `back` the eye must be for each point to be in the frame: |offset . axis| <= half * depth."""
+    right, over = _frame(back, np.array(scene.up))
+    depth = offset @ back
+    return np.asarray(np.maximum(np.abs(offset @ right) / (half * aspect), np.abs(offset @ over) / half) + depth)
+
+
 def _orbit_view(name: str, scene: SceneArrays, points: Floats, azimuth: float, numbers: Floats) -> View:
     """Around the object, between its middle and high above, so far away that it fills the frame."""
     elevation = np.radians(4.0 + 46.0 * float(numbers[0]) ** 1.5)
     fov = 32.0 + 20.0 * float(numbers[1])
     back = _direction(scene.up, azimuth, float(elevation))
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    right, over = _frame(back, np.array(scene.up))
     half_v = np.tan(np.radians(0.5 * fov))
-    offset = points - centre
-    # The eye is at `distance` along `back`; a point is in the frame if |offset . axis| <= half * (distance - depth).
-    depth = offset @ back
-    needed = np.maximum(np.abs(offset @ right) / (half_v * ASPECT), np.abs(offset @ over) / half_v) + depth
+    needed = _needed(points - centre, back, scene, float(half_v), ASPECT)
     distance = float(np.quantile(needed, 0.995)) * (0.85 + 0.3 * float(numbers[2]))
     distance = max(distance, 1e-3 * float(np.linalg.norm(scene.bounds[1] - scene.bounds[0])), 1e-6)
     return _view(name, centre + distance * back, centre, scene, fov)

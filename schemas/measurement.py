@@ -37,11 +37,13 @@ class Measurement(_Record):
         captured_fragments: Sum of k over the pixels, at most `budget`.
         total_fragments: N, transparent fragments of the view.
         pool_bytes: Size of the fragment pool.
+        pixel_bytes: All other buffers of the technique, bytes a pixel.
         total_bytes: All buffers of the technique that depend on budget or resolution.
         passes: Wall time of each pass, ms.
         total_ms: Wall time of a frame, ms.
         cpu_difference: Largest difference, of 255, between the picture and the CPU simulation of the same allocation.
         exact: Whether the budget holds every fragment, so that the picture is exact by construction.
+        skips: What of the frame was not needed and is exact without it -> how often.
         skipped: Why it was not run; None if it was.
     """
 
@@ -63,11 +65,13 @@ class Measurement(_Record):
     captured_fragments: int | None = Field(default=None, ge=0)
     total_fragments: int = Field(ge=0)
     pool_bytes: int | None = Field(default=None, ge=0)
+    pixel_bytes: int | None = Field(default=None, ge=0)
     total_bytes: int | None = Field(default=None, ge=0)
     passes: dict[str, float] = {}
     total_ms: float | None = Field(default=None, ge=0.0)
     cpu_difference: int | None = Field(default=None, ge=0, le=255)
     exact: bool = False
+    skips: dict[str, int] = {}
     skipped: str | None = None
 
 

@@ -22,7 +22,7 @@ class Texture:
         name: Asset name, for messages.
         pixels: uint8 [h, w, 4], row 0 at the bottom (the GL and USD `st` convention).
         srgb: Whether RGB is sRGB-encoded (decoded to linear when sampled); alpha never is.
-        wrap: How `s` and `t` outside [0,1] are mapped.
+        wrap: How `s` and `t` outside [0,1] are mapped; `black` is zero there in all four channels.
     """
 
     name: str
@@ -35,23 +35,31 @@ class Texture:
 class Batch:
     """A run of triangles drawn with one set of textures.
 
-    Constant diffuse colour, display colour and constant opacity are baked into the vertex colours; a texture
-    multiplies them.
+    Constant diffuse colour, display colour and constant opacity are baked into the vertex colours; colour and opacity
+    textures multiply them, an emission texture is added. A sample is texel * scale + bias, clamped to [0,1].
 
     Attributes:
         first: First index (into `SceneArrays.indices`).
         count: Number of indices, a multiple of 3.
         layer: `opaque`: every fragment is opaque. `transparent`: every fragment has the vertex alpha < 1.
-            `mixed`: opacity comes from a texture; a fragment of stored alpha 255 is opaque, of 0 is nothing.
+            `mixed`: opacity varies; a fragment of stored alpha 255 is opaque, of 0 is nothing.
         colour_texture: Index into `SceneArrays.textures`, or -1.
         colour_scale: float RGBA factor on the sampled colour (UsdUVTexture `scale`).
         colour_bias: float RGBA offset on the sampled colour (UsdUVTexture `bias`).
+        colour_uv: Which texture coordinates it reads: 0 `SceneArrays.uvs`, 1 and 2 the halves of `more_uvs`.
         opacity_texture: Index into `SceneArrays.textures`, or -1.
         opacity_channel: 0..3, which channel of the opacity texture is read.
         opacity_scale: Factor on that channel.
         opacity_bias: Offset on that channel.
-        opacity_threshold: If > 0, fragments with texture opacity below it are discarded and the others keep
-            the vertex alpha (UsdPreviewSurface `opacityThreshold`); else the texture multiplies the vertex alpha.
+        opacity_uv: As `colour_uv`.
+        opacity_threshold: If > 0, fragments whose opacity (the texture's, or the vertex alpha where there is none) is
+            below it are discarded and the others have `cut_out_alpha` (UsdPreviewSurface `opacityThreshold`); else
+            the texture multiplies the vertex alpha.
+        cut_out_alpha: Alpha of what the threshold leaves.
+        emission_texture: Index into `SceneArrays.textures`, or -1.
+        emission_scale: float RGBA factor on the sampled emission.
+        emission_bias: float RGBA offset on the sampled emission.
+        emission_uv: As `colour_uv`.
     """
 
     first: int
@@ -60,11 +68,28 @@ class Batch:
     colour_texture: int = -1
     colour_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     colour_bias: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    colour_uv: int = 0
     opacity_texture: int = -1
     opacity_channel: int = 3
     opacity_scale: float = 1.0
     opacity_bias: float = 0.0
+    opacity_uv: int = 0
     opacity_threshold: float = 0.0
+    cut_out_alpha: float = 1.0
+    emission_texture: int = -1
+    emission_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    emission_bias: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    emission_uv: int = 0
+
+    @property
+    def textures(self) -> tuple[int, ...]:
+        """Indices of the textures it samples."""
+        return tuple(t for t in (self.colour_texture, self.opacity_texture, self.emission_texture) if t >= 0)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the vertex colours alone decide colour and opacity."""
+        return not self.textures and self.opacity_threshold <= 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +111,7 @@ class SceneArrays:
         metres_per_unit: The stage's scale, already applied.
         cameras: Views of the stage's own cameras (already relative to `origin`, metres).
         warnings: What was not supported or was missing, each naming the prim's path.
+        more_uvs: float32 [V, 4], a second and a third pair of texture coordinates; None where no batch reads them.
     """
 
     name: str
@@ -102,6 +128,7 @@ class SceneArrays:
     metres_per_unit: float
     cameras: tuple[View, ...] = ()
     warnings: tuple[str, ...] = field(default=())
+    more_uvs: NDArray[np.float32] | None = None
 
     @property
     def triangles(self) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 Vec3 = tuple[float, float, float]
 
@@ -48,6 +48,8 @@ class View(BaseModel):
         ortho_height: Height of an orthographic window, metres; None for perspective.
         near: Near clip distance, metres, > 0; None: from the scene's bounds.
         far: Far clip distance, metres; None: from the scene's bounds.
+        shift: Where the view axis meets the picture's plane, the picture's centre is so many picture heights away from
+            there, to the right and upwards (lens shift, USD's aperture offsets).
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -60,6 +62,7 @@ class View(BaseModel):
     ortho_height: float | None = Field(default=None, gt=0.0)
     near: float | None = Field(default=None, gt=0.0)
     far: float | None = Field(default=None, gt=0.0)
+    shift: tuple[FiniteFloat, FiniteFloat] = (0.0, 0.0)
 
     def world_to_view(self) -> NDArray[np.float64]:
         """float64 [4, 4], column-vector convention: `view = M @ world`."""
@@ -85,14 +88,17 @@ class View(BaseModel):
     def projection(self, aspect: float, near: float, far: float) -> NDArray[np.float64]:
         """float64 [4, 4] GL clip matrix (z in [-w, w]) for a window of `aspect` = width / height."""
         matrix = np.zeros((4, 4))
+        aside = 2.0 * self.shift[0] / aspect, 2.0 * self.shift[1]
         if self.ortho_height is not None:
             half = 0.5 * self.ortho_height
             matrix[0, 0], matrix[1, 1] = 1.0 / (half * aspect), 1.0 / half
             matrix[2, 2], matrix[2, 3] = -2.0 / (far - near), -(far + near) / (far - near)
+            matrix[:2, 3] = -aside[0], -aside[1]
             matrix[3, 3] = 1.0
             return matrix
         f = 1.0 / np.tan(np.radians(self.fov) / 2.0)
         matrix[0, 0], matrix[1, 1] = f / aspect, f
+        matrix[:2, 2] = aside
         matrix[2, 2], matrix[2, 3] = (far + near) / (near - far), 2.0 * far * near / (near - far)
         matrix[3, 2] = -1.0
         return matrix

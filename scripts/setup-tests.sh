@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Sees to what only the tests need: PostgreSQL's programs. The tests start servers of their own with them.
+# Sees to what only the tests need: PostgreSQL's programs, with which the tests start servers of their own, and Mesa's
+# zink over its software Vulkan driver, on which they draw every technique a second time.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=scripts/common.sh
@@ -9,6 +10,16 @@ have_postgresql() {
     command -v initdb >/dev/null || compgen -G '/usr/lib/postgresql/*/bin/initdb' >/dev/null
 }
 
-have_postgresql && exit 0
-apt_install "PostgreSQL is missing" postgresql
-have_postgresql || die "PostgreSQL was installed, but there is no initdb in the PATH or /usr/lib/postgresql."
+have_zink() {
+    GALLIUM_DRIVER=zink MESA_LOADER_DRIVER_OVERRIDE=zink LIBGL_ALWAYS_SOFTWARE=1 XDG_RUNTIME_DIR=${TMPDIR:-/tmp} \
+        .venv/bin/python -m renderer.context 2>/dev/null | grep -q '^zink'
+}
+
+if ! have_postgresql; then
+    apt_install "PostgreSQL is missing" postgresql
+    have_postgresql || die "PostgreSQL was installed, but there is no initdb in the PATH or /usr/lib/postgresql."
+fi
+if ! have_zink; then
+    apt_install "zink has no Vulkan driver" mesa-vulkan-drivers libvulkan1
+    have_zink || say "zink still makes no OpenGL context: tests/integration/test_zink.py will fail."
+fi

@@ -7,12 +7,12 @@ from typing import Final
 
 import moderngl
 import numpy as np
-import onnxruntime
 import torch
 from numpy.typing import NDArray
 
 from renderer.context import describe
 from renderer.features import FEATURES
+from renderer.onnx_network import OnnxNetwork
 from schemas.bundle import GLSL, ONNX, ParityReport
 from schemas.problem import ExitCode, Problem
 from trainer.models import GainCurve
@@ -68,7 +68,7 @@ def check(
     report = ParityReport(
         count=len(inputs),
         tolerance=tolerance,
-        torch_onnx=_difference(truth, onnx_outputs(folder / ONNX, inputs), "onnxruntime"),
+        torch_onnx=_difference(truth, OnnxNetwork(folder / ONNX).run(inputs), "onnxruntime"),
         torch_glsl=_difference(truth, glsl_outputs(folder / GLSL, inputs, ctx), "GLSL"),
         driver=describe(ctx),
     )
@@ -88,18 +88,6 @@ def torch_outputs(weights: Weights, inputs: NDArray[np.float32]) -> NDArray[np.f
         for start in range(0, len(inputs), CHUNK):
             a, b = model(torch.from_numpy(inputs[start : start + CHUNK]))
             parts.append(torch.stack([a, b], dim=1).numpy())
-    return np.concatenate(parts)
-
-
-def onnx_outputs(path: Path, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The same from an ONNX file in onnxruntime, on the CPU."""
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 2
-    session = onnxruntime.InferenceSession(path.read_bytes(), options, providers=["CPUExecutionProvider"])
-    parts = []
-    for start in range(0, len(inputs), CHUNK):
-        a, b = session.run(["a", "b"], {"features": inputs[start : start + CHUNK]})
-        parts.append(np.stack([a, b], axis=1))
     return np.concatenate(parts)
 
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer.frame import Frame
 from schemas.tail import DENSITY_G, TailName
+
+ChainForm = Literal["auto", "one-pass", "two-pass"]
+"""How the bounded techniques find the nearest fragments: `auto` is one pass where the driver has 64-bit atomics."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,25 +24,27 @@ class Budget:
         fragments: F, slots of 8 bytes in the fragment pool.
         tail: How fragments beyond the core are approximated (METHOD.md section 2).
         g: The density tail's constant.
+        chain: Form of the chain; tests and benchmarks force one.
     """
 
     fragments: int
     tail: TailName = "density"
     g: float = DENSITY_G
+    chain: ChainForm = "auto"
 
 
 @dataclass(frozen=True, slots=True)
 class Rendered:
-    """A finished picture.
+    """A finished picture, and what it cost.
 
     Attributes:
         linear: float32 [H, W, 3], linear RGB, row 0 at the top.
-        k: int32 [P], core fragments each pixel was allotted (clipped to n).
+        k: int32 [P], fragments of each pixel that are kept apart (clipped to n); 0 where all are blended into sums.
         passes: Milliseconds of each pass, in order; shared passes (opaque, count, gather) as first measured.
-        captured: Core fragments stored.
-        pool_bytes: Bytes of the fragment pool.
-        total_bytes: Pool and all per-pixel buffers that live at the same time.
-        skipped: What was not needed, in words; empty if nothing.
+        captured: Sum of k.
+        pool_bytes: Bytes of storage that depend on the number of fragments or slots.
+        pixel_bytes: Bytes a pixel of all other buffers that live at the same time; the picture itself is not counted.
+        skips: What was not needed and is exact without it: words -> how often. See `renderer.techniques.skips`.
     """
 
     linear: NDArray[np.float32]
@@ -46,8 +52,13 @@ class Rendered:
     passes: dict[str, float]
     captured: int
     pool_bytes: int
-    total_bytes: int
-    skipped: tuple[str, ...] = ()
+    pixel_bytes: int
+    skips: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def total_bytes(self) -> int:
+        """Pool and all per-pixel buffers."""
+        return self.pool_bytes + self.pixel_bytes * len(self.k)
 
     @property
     def milliseconds(self) -> float:
@@ -61,5 +72,5 @@ class Technique(Protocol):
     name: str
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
-        """Render a frame within a budget."""
+        """Render a frame within a budget; a technique without one does not read it."""
         ...

@@ -1,30 +1,58 @@
-"""The k(p) nearest fragments of every pixel by the lock-free two-pass chain, the tail, and the resolve.
+"""The k(p) nearest fragments of every pixel by a lock-free chain of slots, the tail, and the resolve.
 
 All hybrid techniques are this with another k(p). The pool is one run of slots a pixel (an S-buffer), so that a budget
 is used as allotted.
+
+Slots of a run are passed in order: each keeps the minimum of what passes it and hands the larger value on, so slot i
+ends as the i-th smallest whatever the order of arrival. With 64-bit atomic minima on (depth, packed colour) that is one
+pass, and what falls out of the last slot goes to the tail at once. Without, a first pass finds the depths, and a second
+one the colours and the tail. The core is the same to the bit; the tail's sums are added in another order. Where a
+driver shades fragments of one pixel at the same time, which of them carries an evicted one to the tail is not fixed, so
+the last bits of the one-pass tail may differ from run to run there.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.bands import row_bands
 from renderer.csr import offsets_of
-from renderer.frame import Clock, Frame, Gather
-from renderer.gpu_scene import set_uniforms
+from renderer.frame import Clock, Frame, Gathered
+from renderer.screen import TURNS, read_linear, resolve_screen
 from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.skips import TAIL, frame_skips
+from schemas.limits import LIMITS
+from schemas.problem import ExitCode, Problem
 from schemas.tail import MAX_EXPONENT, TailName
 
 SLOT_BYTES = 8
 """Depth and packed colour."""
 
+_EXTENSIONS = frozenset({"GL_NV_shader_atomic_int64", "GL_ARB_gpu_shader_int64"})
 _EMPTY = 0xFFFFFFFF
 _TAIL_CODES: dict[TailName, int] = {"exact-coverage": 0, "density": 1, "weighted-average": 2, "paper": 3}
 _NO_TAIL = -1
 
-# Storage bindings of kbuffer/*.frag.
+# Storage bindings of kbuffer/*.frag; the slots of the one-pass chain are where the colours of the other are.
 _OFFSETS, _DEPTHS, _COLOURS, _Z_MIN, _Z_MAX = range(5)
+
+
+@dataclass(frozen=True, slots=True)
+class _Tail:
+    """What the tail needs: its code in the shaders, the density tail's constant and the pixel's optical depth."""
+
+    code: int
+    g: float
+    sums: moderngl.Texture | None
+
+
+def one_pass_available(ctx: moderngl.Context) -> bool:
+    """Whether the driver has 64-bit atomics."""
+    return ctx.extensions >= _EXTENSIONS
 
 
 def render_chain(
@@ -32,92 +60,115 @@ def render_chain(
     slots: NDArray[np.integer],
     n: NDArray[np.integer],
     budget: Budget,
-    gathered: Gather | None = None,
+    gathered: Gathered | None = None,
 ) -> Rendered:
     """Capture the nearest fragments into given slots, add the tail, resolve.
+
+    Where every pixel has a slot for every fragment, there is no tail: none is gathered or blended.
 
     Args:
         frame: The view.
         slots: int [P], slots a pixel gets; may exceed n(p), then some stay empty.
         n: int [P], fragments of each pixel.
-        budget: Tail and its constant; `sum slots` is not checked against it here.
+        budget: Tail, its constant, and the form of the chain; `sum slots` is not checked against it here.
         gathered: What the technique has gathered to choose its slots, if anything.
 
     Returns:
         The picture; passes in order, memory as allocated.
+
+    Raises:
+        Problem: The pool is larger than a storage buffer may be, or the driver lacks the form that was asked for.
     """
-    if gathered is None and budget.tail == "density":
-        gathered = "gather-tail"
-    sums = None if gathered is None else frame.gather(gathered).sums[0]
-    needed = ["count"] if gathered is None else ["count", gathered]
+    complete = bool((slots >= n).all())
+    if gathered is None and budget.tail == "density" and not complete:
+        gathered = frame.gather("gather-tail")
+    sums = None if gathered is None else gathered.sums[0]
+    needed = ["count"] if gathered is None else ["count", gathered.name]
+    tail = _Tail(_NO_TAIL if complete else _TAIL_CODES[budget.tail], budget.g, sums)
     clock = Clock(frame.ctx)
-    image, pool_bytes = _passes(frame, clock, slots, budget, sums)
+    with clock.measure("prefix"):
+        offsets = offsets_of(slots)
+        offset_buffer = frame.ctx.buffer(offsets.astype(np.uint32))
+        offset_buffer.bind_to_storage_buffer(_OFFSETS)
+    _check_turns(offsets)
+    total = int(offsets[-1])
+    chain = _one_pass if _is_one_pass(frame.ctx, budget, total) else _two_pass
+    image = chain(frame, clock, total, tail)
     k = np.minimum(slots, n).astype(np.int32)
     return Rendered(
-        linear=image,
+        linear=read_linear(frame, image),
         k=k,
         passes={**frame.passes("opaque", *needed), **clock.passes},
         captured=int(k.sum(dtype=np.int64)),
-        pool_bytes=pool_bytes,
-        total_bytes=pool_bytes + frame.pixels * _bytes_a_pixel(needed),
+        pool_bytes=SLOT_BYTES * total,
+        pixel_bytes=_bytes_a_pixel(gathered, complete),
+        skips={**frame_skips(frame), TAIL: int(complete)},
     )
 
 
-def _bytes_a_pixel(needed: list[str]) -> int:
-    """Offsets and the tail's two targets, and what the passes before left alive."""
-    live = {"count": 12, "gather-tail": 16, "gather-nearest": 16 + 8, "gather": 5 * 16 + 8}
-    return 4 + 2 * 16 + sum(live.get(name, 0) for name in needed)
+def _bytes_a_pixel(gathered: Gathered | None, complete: bool) -> int:
+    """Offsets, n and depth range, the tail's two targets, and what the gather pass left alive."""
+    return 4 + 12 + (0 if complete else 2 * 16) + (0 if gathered is None else gathered.pixel_bytes)
 
 
-def _passes(
-    frame: Frame, clock: Clock, slots: NDArray[np.integer], budget: Budget, sums: moderngl.Texture | None
-) -> tuple[NDArray[np.float32], int]:
-    with clock.measure("prefix"):
-        offsets = offsets_of(slots)
-        total = int(offsets[-1])
-        offset_buffer = frame.ctx.buffer(offsets.astype(np.uint32))
-        depths, colours = frame.buffer(total, _EMPTY), frame.buffer(total, _EMPTY)
-    for binding, buffer in ((_OFFSETS, offset_buffer), (_DEPTHS, depths), (_COLOURS, colours)):
-        buffer.bind_to_storage_buffer(binding)
+def _is_one_pass(ctx: moderngl.Context, budget: Budget, total: int) -> bool:
+    available = one_pass_available(ctx)
+    if budget.chain == "auto":
+        # Its slots are one buffer, those of the two-pass chain are two of half the size.
+        return available and SLOT_BYTES * total <= LIMITS.buffer_bytes
+    if budget.chain == "one-pass" and not available:
+        raise Problem(
+            "This driver has no 64-bit atomics, which the one-pass chain needs.",
+            "Use the two-pass chain: its core is the same.",
+            ExitCode.USAGE,
+        )
+    return budget.chain == "one-pass"
+
+
+def _one_pass(frame: Frame, clock: Clock, total: int, tail: _Tail) -> moderngl.Texture:
+    with clock.measure("chain"):
+        slots = frame.buffer(2 * total, _EMPTY)
+        slots.bind_to_storage_buffer(_COLOURS)
+        tails = _draw_with_tail(frame, "kbuffer/chain.frag", tail)
+    with clock.measure("resolve"):
+        return _resolve(frame, tail.code, tails, stride=2)
+
+
+def _two_pass(frame: Frame, clock: Clock, total: int, tail: _Tail) -> moderngl.Texture:
     with clock.measure("chain-depth"):
+        depths, colours = frame.buffer(total, _EMPTY), frame.buffer(total, _EMPTY)
+        depths.bind_to_storage_buffer(_DEPTHS)
+        colours.bind_to_storage_buffer(_COLOURS)
         frame.draw_transparent("kbuffer/chain_depth.frag", frame.target([]))
         frame.ctx.memory_barrier()
     with clock.measure("chain-colour"):
-        tails = _chain_colour(frame, budget, sums)
+        tails = _draw_with_tail(frame, "kbuffer/chain_colour.frag", tail)
     with clock.measure("resolve"):
-        target = resolve(frame, _TAIL_CODES[budget.tail], tails)
-    image = read_linear(frame, target)
-    return image, SLOT_BYTES * total
+        return _resolve(frame, tail.code, tails, stride=1)
 
 
-def _chain_colour(frame: Frame, budget: Budget, sums: moderngl.Texture | None) -> list[moderngl.Texture]:
-    tails = [frame.ctx.texture((frame.width, frame.height), 4, dtype="f4") for _ in range(2)]
-    target = frame.target(tails)
-    for tail in tails:
-        frame.ctx.framebuffer([tail]).clear(0.0, 0.0, 0.0, 0.0)
-    if sums is not None:
+def _draw_with_tail(frame: Frame, fragment: str, tail: _Tail) -> list[moderngl.Texture]:
+    """Draw into the bound slots; the two targets that hold the tail's sums, or none."""
+    tails: list[moderngl.Texture] = []
+    if tail.code != _NO_TAIL:
+        tails = [frame.ctx.texture((frame.width, frame.height), 4, dtype="f4") for _ in range(2)]
+        for texture in tails:
+            frame.ctx.framebuffer([texture]).clear(0.0, 0.0, 0.0, 0.0)
         _, z_min, z_max = frame.depth_range()
         z_min.bind_to_storage_buffer(_Z_MIN)
         z_max.bind_to_storage_buffer(_Z_MAX)
-        sums.use(0)
-    defines = {"TAIL": _TAIL_CODES[budget.tail], "MAX_EXPONENT": MAX_EXPONENT}
-    frame.draw_transparent("kbuffer/chain_colour.frag", target, defines, gathered=0, density_g=budget.g)
+        if tail.sums is not None:
+            tail.sums.use(0)
+    defines = {"TAIL": tail.code, "MAX_EXPONENT": MAX_EXPONENT}
+    frame.draw_transparent(fragment, frame.target(tails), defines, gathered=0, density_g=tail.g)
     frame.ctx.memory_barrier()
     return tails
 
 
-def resolve(frame: Frame, tail_code: int, tails: list[moderngl.Texture]) -> moderngl.Texture:
+def _resolve(frame: Frame, tail_code: int, tails: list[moderngl.Texture], stride: int) -> moderngl.Texture:
     """Composite the bound pool (offsets, colours) over the tail and the background; RGBA32F, linear."""
-    image = frame.ctx.texture((frame.width, frame.height), 4, dtype="f4")
-    program = frame.gpu.programs.get("common/fullscreen.vert", "kbuffer/resolve.frag", {"TAIL": tail_code})
-    set_uniforms(program, {"width": frame.width, "background": 0, "tail_colour": 1, "tail_opacity": 2})
-    for unit, texture in enumerate([frame.background, *tails]):
-        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        texture.use(unit)
-    frame.ctx.framebuffer([image]).use()
-    frame.ctx.enable_only(moderngl.NOTHING)
-    frame.ctx.vertex_array(program, []).render(moderngl.TRIANGLES, vertices=3)
-    return image
+    defines = {"TAIL": tail_code, "STRIDE": stride}
+    return resolve_screen(frame, "kbuffer/resolve.frag", [frame.background, *tails], defines, first_row=0)
 
 
 def resolve_all(frame: Frame, offsets: NDArray[np.int64], packed: NDArray[np.uint32]) -> NDArray[np.float32]:
@@ -130,17 +181,32 @@ def resolve_all(frame: Frame, offsets: NDArray[np.int64], packed: NDArray[np.uin
 
     Returns:
         float32 [H, W, 3], linear.
+
+    Raises:
+        Problem: One pixel has more fragments than a shader can visit, or one row more than a storage buffer holds.
     """
-    offset_buffer = frame.ctx.buffer(offsets.astype(np.uint32))  # named, or it would be freed before it is read
-    offset_buffer.bind_to_storage_buffer(_OFFSETS)
-    pool = frame.buffer(len(packed), _EMPTY)
-    if len(packed):
-        pool.write(np.ascontiguousarray(packed))
-    pool.bind_to_storage_buffer(_COLOURS)
-    return read_linear(frame, resolve(frame, _NO_TAIL, []))
+    _check_turns(offsets)
+    image = frame.ctx.texture((frame.width, frame.height), 4, dtype="f4")
+    for first, rows in row_bands(offsets, frame.width, LIMITS.buffer_bytes // 4) or [(0, frame.height)]:
+        run = offsets[first * frame.width : (first + rows) * frame.width + 1]
+        offset_buffer = frame.ctx.buffer(
+            (run - run[0]).astype(np.uint32)
+        )  # named, or it would be freed before it is read
+        pool = frame.ctx.buffer(np.ascontiguousarray(packed[run[0] : run[-1]]) if run[-1] > run[0] else bytes(4))
+        offset_buffer.bind_to_storage_buffer(_OFFSETS)
+        pool.bind_to_storage_buffer(_COLOURS)
+        band = (image, first, rows)
+        defines = {"TAIL": _NO_TAIL, "STRIDE": 1}
+        resolve_screen(frame, "kbuffer/resolve.frag", [frame.background], defines, band, first_row=first)
+    return read_linear(frame, image)
 
 
-def read_linear(frame: Frame, image: moderngl.Texture) -> NDArray[np.float32]:
-    """An RGBA32F texture as float32 [H, W, 3]."""
-    rgba = np.frombuffer(image.read(), dtype=np.float32).reshape(frame.height, frame.width, 4)
-    return np.ascontiguousarray(rgba[:, :, :3])
+def _check_turns(offsets: NDArray[np.int64]) -> None:
+    """Raises Problem if a pixel has more slots than one shader can visit."""
+    most = int(np.diff(offsets).max(initial=0))
+    if most > TURNS:
+        raise Problem(
+            f"A pixel has {most:,} fragments or slots; one shader can visit {TURNS:,}.",
+            "Ask for a smaller budget or another view.",
+            ExitCode.LIMIT,
+        )

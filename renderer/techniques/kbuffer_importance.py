@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from renderer.allocation.fill import budget_fill, feasible_k_min
@@ -9,6 +11,7 @@ from renderer.allocation.importance import VkbOptions, vkb_importance
 from renderer.frame import Clock, Frame
 from renderer.techniques.base import Budget, Rendered
 from renderer.techniques.chain import render_chain
+from renderer.techniques.skips import PREDICTOR
 
 
 class KBufferImportance:
@@ -24,8 +27,11 @@ class KBufferImportance:
         self._options = options or VkbOptions()
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
-        """Render a frame with slots by importance."""
+        """Render a frame with slots by importance; none is computed where the budget holds every fragment."""
         n = frame.count()
+        if budget.fragments >= int(n.sum(dtype=np.int64)):
+            rendered = render_chain(frame, n, n, budget)
+            return replace(rendered, skips={**rendered.skips, PREDICTOR: 1})
         gathered = frame.gather("gather-nearest")
         assert gathered.nearest_facing is not None, "this gather has the nearest fragment"
         clock = Clock(frame.ctx)
@@ -33,6 +39,6 @@ class KBufferImportance:
             facing = np.frombuffer(gathered.nearest_facing.read(4 * frame.pixels), dtype=np.uint32).astype(np.uint8)
             weights = vkb_importance(n, facing, frame.width, frame.height, self._options)
             slots = budget_fill(weights, n, budget.fragments, feasible_k_min(n, budget.fragments))
-        rendered = render_chain(frame, slots, n, budget, gathered="gather-nearest")
+        rendered = render_chain(frame, slots, n, budget, gathered)
         rendered.passes.update(clock.passes)
         return rendered

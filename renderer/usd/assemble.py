@@ -37,6 +37,7 @@ class Arrays:
     batches: tuple[Batch, ...]
     origin: NDArray[np.float64]
     bounds: NDArray[np.float64]
+    more_uvs: NDArray[np.float32] | None
 
 
 def assemble(placed: list[Placed]) -> Arrays:
@@ -55,10 +56,13 @@ def assemble(placed: list[Placed]) -> Arrays:
         )
     low, high = _bounds(placed)
     origin = 0.5 * (low + high)
-    filler = _Filler(vertices, triangles, origin)
+    filler = _Filler(vertices, triangles, origin, any(p.part.more_uvs is not None for p in placed))
     batches = filler.fill(placed)
     bounds = np.stack((filler.positions.min(axis=0), filler.positions.max(axis=0))).astype(np.float64)
-    return Arrays(filler.positions, filler.normals, filler.uvs, filler.colours, filler.indices, batches, origin, bounds)
+    return Arrays(
+        *(filler.positions, filler.normals, filler.uvs, filler.colours, filler.indices),
+        *(batches, origin, bounds, filler.more_uvs),
+    )
 
 
 def _bounds(placed: list[Placed]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -84,18 +88,34 @@ def _chunks(item: Placed) -> list[NDArray[np.float64]]:
 
 def _transform(points: NDArray[np.float64], matrices: NDArray[np.float64]) -> NDArray[np.float64]:
     """float64 [M, V, 3]."""
-    return points[None] @ matrices[:, :3, :3] + matrices[:, None, 3, :3]
+    placed = _times(points, matrices[:, :3, :3])
+    placed += matrices[:, None, 3, :3]
+    return placed
+
+
+def _times(rows: NDArray[np.floating], matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rows [V, 3] by each of the matrices [M, 3, 3], float64 [M, V, 3]."""
+    result = np.empty((len(matrices), len(rows), 3))
+    x, y, z = rows.T
+    # Column by column: numpy's product of many rows with so small a matrix takes nine times as long.
+    with np.errstate(invalid="ignore", over="ignore"):
+        # Whatever is not finite is found, and named, in the bounds.
+        for axis in range(3):
+            a, b, c = (matrices[:, k, axis, None] for k in range(3))
+            result[:, :, axis] = a * x + b * y + c * z
+    return result
 
 
 class _Filler:
     """Final arrays, filled part by part."""
 
-    def __init__(self, vertices: int, triangles: int, origin: NDArray[np.float64]) -> None:
+    def __init__(self, vertices: int, triangles: int, origin: NDArray[np.float64], more_uvs: bool) -> None:
         self.positions = np.empty((vertices, 3), dtype=np.float32)
         self.normals = np.empty((vertices, 3), dtype=np.float32)
         self.uvs = np.empty((vertices, 2), dtype=np.float32)
         self.colours = np.empty((vertices, 4), dtype=np.uint8)
         self.indices = np.empty(3 * triangles, dtype=np.uint32)
+        self.more_uvs = np.zeros((vertices, 4), dtype=np.float32) if more_uvs else None
         self._origin = origin
         self._vertex = 0
         self._index = 0
@@ -121,6 +141,8 @@ class _Filler:
         self.normals[rows] = _turned(part.normals, matrices).reshape(-1, 3)
         self.uvs[rows] = np.tile(part.uvs, (copies, 1))
         self.colours[rows] = np.tile(part.colours, (copies, 1))
+        if self.more_uvs is not None and part.more_uvs is not None:
+            self.more_uvs[rows] = np.tile(part.more_uvs, (copies, 1))
         base = self._vertex + size * np.arange(copies, dtype=np.int64)
         triangles = np.broadcast_to(part.triangles[None].astype(np.int64), (copies, *part.triangles.shape))
         # A mirroring transform turns the winding round; exchanging two corners keeps the outside outside.
@@ -141,7 +163,7 @@ def _turned(normals: NDArray[np.float32], matrices: NDArray[np.float64]) -> NDAr
     sign = np.where(np.linalg.det(m) < 0.0, -1.0, 1.0)
     scale = np.abs(cofactors).max(axis=(1, 2), keepdims=True)
     cofactors = cofactors * sign[:, None, None] / np.where(scale > 0.0, scale, 1.0)
-    turned = normals.astype(np.float64)[None] @ cofactors
-    length = np.linalg.norm(turned, axis=2, keepdims=True)
+    turned = _times(normals.astype(np.float64), cofactors)
+    length = np.sqrt(np.einsum("mvi,mvi->mv", turned, turned))[:, :, None]
     turned = np.where(length > 0.0, turned / np.where(length > 0.0, length, 1.0), np.array([0.0, 0.0, 1.0]))
     return turned.astype(np.float32)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +16,25 @@ APERTURE_UNIT = 0.1
 """USD gives apertures and focal lengths in tenths of a scene unit."""
 
 
+@dataclass(frozen=True, slots=True)
+class StageCamera:
+    """A camera of a stage.
+
+    Attributes:
+        path: Its prim.
+        view: What it sees; the name is the prim's, made unique.
+        aspect: Width / height of its aperture.
+    """
+
+    path: str
+    view: View
+    aspect: float
+
+
 def read_cameras(
     stage: Usd.Stage, time: Usd.TimeCode, origin: NDArray[np.float64], metres: float, log: WarningLog
-) -> tuple[View, ...]:
-    """Views of all cameras, in traversal order.
+) -> tuple[StageCamera, ...]:
+    """All cameras that can be used, in traversal order.
 
     Args:
         stage: The stage.
@@ -28,20 +44,28 @@ def read_cameras(
         log: Gets a line for every camera that cannot be used.
     """
     cache = UsdGeom.XformCache(time)
-    views: list[View] = []
+    cameras: list[StageCamera] = []
     for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         if not prim.IsA(UsdGeom.Camera):
             continue
         matrix = np.array(cache.GetLocalToWorldTransform(prim), dtype=np.float64)
         view = _view(UsdGeom.Camera(prim), matrix, time, origin, metres, log)
         if view is not None:
-            taken = {v.name for v in views}
+            taken = {camera.view.name for camera in cameras}
             number = 2
             name = view.name
             while name in taken:
                 name, number = f"{view.name}{number}", number + 1
-            views.append(view.model_copy(update={"name": name}))
-    return tuple(views)
+            view = view.model_copy(update={"name": name})
+            cameras.append(StageCamera(str(prim.GetPath()), view, _aspect(UsdGeom.Camera(prim), time)))
+    return tuple(cameras)
+
+
+def _aspect(camera: UsdGeom.Camera, time: Usd.TimeCode) -> float:
+    """Width / height of the aperture; 1 where it has none, as `usdrecord` has it."""
+    width, height = camera.GetHorizontalApertureAttr().Get(time), camera.GetVerticalApertureAttr().Get(time)
+    aspect = float(width) / float(height) if width and height else 0.0
+    return aspect if math.isfinite(aspect) and aspect > 1e-4 else 1.0
 
 
 def _view(
@@ -61,9 +85,6 @@ def _view(
     if back is None or up is None or not all(math.isfinite(s) and s > 0.0 for s in sizes):
         log.add("the camera's transform, aperture or focal length cannot be used, left out", path)
         return None
-    offsets = (camera.GetHorizontalApertureOffsetAttr().Get(time), camera.GetVerticalApertureOffsetAttr().Get(time))
-    if any(offsets):
-        log.add("the camera's aperture offset is left out", path)
     eye = matrix[3, :3] * metres - origin
     distance = _focus(camera, time) * metres
     target = eye - back * (distance if distance > 0.0 else max(float(np.linalg.norm(eye)), 1e-3))
@@ -77,7 +98,18 @@ def _view(
         ortho_height=aperture * APERTURE_UNIT * metres if ortho else None,
         near=near,
         far=far,
+        shift=_shift(camera, time, aperture, log),
     )
+
+
+def _shift(camera: UsdGeom.Camera, time: Usd.TimeCode, aperture: float, log: WarningLog) -> tuple[float, float]:
+    """Aperture offsets in picture heights; a picture of another shape than the aperture keeps its height (GfCamera)."""
+    offsets = (camera.GetHorizontalApertureOffsetAttr().Get(time), camera.GetVerticalApertureOffsetAttr().Get(time))
+    right, up = (float(offset or 0.0) / aperture for offset in offsets)
+    if not (math.isfinite(right) and math.isfinite(up)):
+        log.add("the camera's aperture offset is not finite, left out", camera.GetPath())
+        return 0.0, 0.0
+    return right, up
 
 
 def _clipping(camera: UsdGeom.Camera, time: Usd.TimeCode, metres: float) -> tuple[float | None, float | None]:

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom
 
+from renderer.usd.native import Likeness
+from renderer.usd.skel import EVERYTHING, Skin, Skins
 from renderer.usd.stage import WarningLog
 from schemas.problem import ExitCode, Problem
 
 DRAWN_PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
+STAND_INS = (UsdGeom.Tokens.bounds, UsdGeom.Tokens.origin, UsdGeom.Tokens.cards)
+"""Draw modes that would show something else instead of a model."""
 MAX_COPIES = 5_000_000
-"""Copies of one prim by point instancers: 128 bytes each."""
+"""Copies of one prim by instancing: 128 bytes each."""
+DEFINED = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
+"""What is on the stage itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,10 +30,12 @@ class Draw:
     Attributes:
         prim: A gprim, maybe an instance proxy.
         matrices: float64 [M, 4, 4], row-vector convention (`p' = p @ M`), to stage space.
+        skin: How a skeleton or blend shapes deform it, or None.
     """
 
     prim: Usd.Prim
     matrices: NDArray[np.float64]
+    skin: Skin | None = None
 
 
 class Walker:
@@ -42,11 +50,22 @@ class Walker:
         self._time = time
         self._log = log
         self._cache = UsdGeom.XformCache(time)
+        self._skins: Skins | None = None
+        self._likeness = Likeness()
+        self._alike: dict[Hashable, list[Usd.Prim]] = {}
 
     def draws(self, stage: Usd.Stage) -> list[Draw]:
-        """Every visible gprim of the stage, in traversal order."""
-        predicate = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
-        return list(self._under(stage.GetPseudoRoot(), None, predicate, ()))
+        """Every visible gprim of the stage: first what is there once, then what native instances repeat."""
+        self._skins = Skins(stage, self._time, self._log)
+        self._alike.clear()
+        single = list(self._under(stage.GetPseudoRoot(), None, DEFINED, ()))
+        return [*single, *(draw for roots in self._alike.values() for draw in self._repeated(roots))]
+
+    def _repeated(self, roots: list[Usd.Prim]) -> Iterator[Draw]:
+        """What is in native instances that look the same, from the first of them."""
+        places = np.stack([self._matrix(root, None) for root in roots])
+        for draw in self._under(roots[0], roots[0], DEFINED, ()):
+            yield Draw(draw.prim, _combine(draw.matrices, places, draw.prim), draw.skin)
 
     def _under(
         self, root: Usd.Prim, relative_to: Usd.Prim | None, predicate: object, parents: tuple[Sdf.Path, ...]
@@ -59,12 +78,34 @@ class Walker:
             if imageable.GetVisibilityAttr().Get(self._time) == UsdGeom.Tokens.invisible:
                 prims.PruneChildren()
                 continue
+            key = self._likeness.key(prim) if relative_to is None and prim.IsInstance() else None
+            if key is not None:
+                prims.PruneChildren()
+                self._alike.setdefault(key, []).append(prim)
+                continue
             if prim.IsA(UsdGeom.PointInstancer):
                 prims.PruneChildren()
                 if imageable.ComputePurpose() in DRAWN_PURPOSES:
                     yield from self._instanced(UsdGeom.PointInstancer(prim), relative_to, parents)
             elif prim.IsA(UsdGeom.Gprim) and imageable.ComputePurpose() in DRAWN_PURPOSES:
-                yield Draw(prim, self._matrix(prim, relative_to)[None])
+                yield self._draw(prim, relative_to)
+            elif prim.IsModel():
+                self._check_draw_mode(prim)
+
+    def _draw(self, prim: Usd.Prim, relative_to: Usd.Prim | None) -> Draw:
+        skin = self._skins.of(prim) if self._skins else None
+        anchor = skin.anchor if skin is not None else None
+        if anchor is None:
+            return Draw(prim, self._matrix(prim, relative_to)[None], skin)
+        if relative_to is not None and not anchor.GetPath().HasPrefix(relative_to.GetPath()):
+            self._log.add("its skeleton is outside of its prototype, it keeps its bind pose", prim.GetPath())
+            return Draw(prim, self._matrix(prim, relative_to)[None])
+        return Draw(prim, self._matrix(anchor, relative_to)[None], skin)
+
+    def _check_draw_mode(self, prim: Usd.Prim) -> None:
+        mode = prim.GetAttribute(UsdGeom.Tokens.modelDrawMode)
+        if mode and mode.Get() in STAND_INS:
+            self._log.add("model:drawMode is not used, the model itself is drawn", prim.GetPath())
 
     def _matrix(self, prim: Usd.Prim, relative_to: Usd.Prim | None) -> NDArray[np.float64]:
         if relative_to is None:
@@ -82,27 +123,32 @@ class Walker:
         if placed is None:
             return
         which, local = placed
-        matrices = local @ self._matrix(instancer.GetPrim(), relative_to)
-        # Prototypes may be `over`s, so that they are not drawn where they stand.
-        predicate = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)
+        matrices = product(local, self._matrix(instancer.GetPrim(), relative_to))
+        if np.any((which < 0) | (which >= len(instancer.GetPrototypesRel().GetForwardedTargets()))):
+            self._log.add("instances of prototypes that do not exist are left out", path)
         for index, target in enumerate(instancer.GetPrototypesRel().GetForwardedTargets()):
             prototype = instancer.GetPrim().GetStage().GetPrimAtPath(target)
             copies = matrices[which == index]
             if not prototype:
                 self._log.add("a prototype is missing", target)
             elif len(copies):
-                for draw in self._under(prototype, prototype, predicate, (*parents, path)):
-                    yield Draw(draw.prim, _combine(draw.matrices, copies, draw.prim))
+                # Prototypes may be `over`s, so that they are not drawn where they stand.
+                copies = product(np.array(self._cache.GetLocalTransformation(prototype)[0]), copies)
+                for draw in self._under(prototype, prototype, EVERYTHING, (*parents, path)):
+                    yield Draw(draw.prim, _combine(draw.matrices, copies, draw.prim), draw.skin)
 
     def _placements(self, instancer: UsdGeom.PointInstancer) -> tuple[NDArray[np.int64], NDArray[np.float64]] | None:
-        """Prototype index [M] and matrix [M, 4, 4] of every instance that is not masked."""
+        """Prototype index [M] and matrix [M, 4, 4] of every instance that is not masked.
+
+        The prototypes' own transforms are not in them: with those USD gives up where one index is wrong.
+        """
         indices = instancer.GetProtoIndicesAttr().Get(self._time)
         count = len(indices) if indices is not None else 0
         if count == 0:
             self._log.add("the point instancer has no instances", instancer.GetPath())
             return None
         matrices = instancer.ComputeInstanceTransformsAtTime(
-            self._time, self._time, UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
+            self._time, self._time, UsdGeom.PointInstancer.ExcludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
         )
         which = np.asarray(indices, dtype=np.int64)
         placed = np.asarray(matrices, dtype=np.float64).reshape(-1, 4, 4)
@@ -119,8 +165,14 @@ def _combine(inner: NDArray[np.float64], outer: NDArray[np.float64], prim: Usd.P
     """All products inner @ outer, float64 [len(outer) * len(inner), 4, 4]."""
     if len(inner) * len(outer) > MAX_COPIES:
         raise Problem(
-            f"Point instancers make {len(inner) * len(outer)} copies of {prim.GetPath()}, more than {MAX_COPIES}.",
+            f"Instancing makes {len(inner) * len(outer)} copies of {prim.GetPath()}, more than {MAX_COPIES}.",
             "Split the scene.",
             ExitCode.LIMIT,
         )
-    return (inner[None] @ outer[:, None]).reshape(-1, 4, 4)
+    return product(inner[None], outer[:, None]).reshape(-1, 4, 4)
+
+
+def product(first: NDArray[np.float64], then: NDArray[np.float64]) -> NDArray[np.float64]:
+    """One transform after the other; what is not finite stays so, for the bounds to find."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(first @ then)

@@ -1,120 +1,194 @@
-"""Colour and opacity of MaterialX documents that a stage refers to, which this build of USD cannot compose itself."""
+"""MaterialX documents that a stage refers to, which this build of USD cannot compose itself, as stages of shaders."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
-from pxr import Sdf, Usd
+from pxr import Sdf, Tf, Usd, UsdShade
 
-OPACITY_OF_GLASS = 0.25
-"""What alpha blending shows of a surface that transmits all light: its tint, not its refraction."""
+Element = ElementTree.Element
 
-
-@dataclass(frozen=True, slots=True)
-class MaterialXSurface:
-    """The part of a MaterialX surface that alpha blending can show.
-
-    Attributes:
-        colour: Linear RGB, where no image gives it.
-        image: File of the base colour, or None.
-        opacity: In [0,1].
-    """
-
-    colour: tuple[float, float, float]
-    image: Path | None
-    opacity: float
-
-
-_INPUTS = {
-    "standard_surface": ("base_color", "opacity", "transmission", "transmission_color"),
-    "open_pbr_surface": ("base_color", "geometry_opacity", "transmission_weight", "transmission_color"),
-    "gltf_pbr": ("base_color", "alpha", "transmission", "attenuation_color"),
-    "UsdPreviewSurface": ("diffuseColor", "opacity", "", ""),
+_TYPES = {
+    "float": Sdf.ValueTypeNames.Float,
+    "integer": Sdf.ValueTypeNames.Int,
+    "boolean": Sdf.ValueTypeNames.Bool,
+    "string": Sdf.ValueTypeNames.String,
+    "filename": Sdf.ValueTypeNames.Asset,
+    "color3": Sdf.ValueTypeNames.Color3f,
+    "color4": Sdf.ValueTypeNames.Color4f,
+    "vector2": Sdf.ValueTypeNames.Float2,
+    "vector3": Sdf.ValueTypeNames.Float3,
+    "vector4": Sdf.ValueTypeNames.Float4,
 }
-"""Names of colour, opacity, transmission and its colour, by node category."""
+"""USD's types for those of MaterialX; values of other types are left out."""
+
+MATERIAL, GRAPH = "surfacematerial", "nodegraph"
 
 
-def referenced_document(prim: Usd.Prim) -> Path | None:
-    """The .mtlx file that a prim refers to in any of its layers, or None."""
-    for spec in prim.GetPrimStack():
-        for reference in spec.referenceList.GetAddedOrExplicitItems():
-            if str(reference.assetPath).lower().endswith(".mtlx"):
-                return Path(Sdf.ComputeAssetPathRelativeToLayer(spec.layer, reference.assetPath))
+def referenced_material(stage: Usd.Stage, path: Sdf.Path) -> tuple[Path, str] | None:
+    """The .mtlx document, and the name in it, of a material that a prim or an ancestor gets by reference; or None."""
+    for above in path.GetPrefixes()[::-1]:
+        prim = stage.GetPrimAtPath(above)
+        for spec in prim.GetPrimStack() if prim else ():
+            arcs = (*spec.referenceList.GetAddedOrExplicitItems(), *spec.payloadList.GetAddedOrExplicitItems())
+            for arc in arcs:
+                if str(arc.assetPath).lower().endswith(".mtlx"):
+                    document = Path(Sdf.ComputeAssetPathRelativeToLayer(spec.layer, arc.assetPath))
+                    return document, (arc.primPath.name if above == path else "") or path.name
     return None
 
 
-def read_surface(document: Path, material: str) -> MaterialXSurface | None:
-    """The surface of a named material of a document; None if it is not there or of an unknown kind."""
+def document_stage(document: Path) -> Usd.Stage | None:
+    """A document's materials, node graphs and nodes as a stage in memory; None if it cannot be parsed."""
     root = _parse(document)
-    if root is None:
-        return None
-    shader = _named(root, _input(_named(root, material), "surfaceshader"), "nodename")
-    if shader is None or shader.tag not in _INPUTS:
-        return None
-    colour_name, opacity_name, transmission_name, tint_name = _INPUTS[shader.tag]
-    transmission = _numbers(_input(shader, transmission_name), 1, (0.0,))[0]
-    opacity = _numbers(_input(shader, opacity_name), 1, (1.0,))[0]
-    base = _input(shader, colour_name)
-    image = _image(root, base, document.parent)
-    colour = _numbers(base, 3, (0.8, 0.8, 0.8) if image is None else (1.0, 1.0, 1.0))
-    if transmission > 0.5:
-        colour, image = _numbers(_input(shader, tint_name), 3, (1.0, 1.0, 1.0)), None
-    opacity *= 1.0 - (1.0 - OPACITY_OF_GLASS) * min(max(transmission, 0.0), 1.0)
-    return MaterialXSurface((colour[0], colour[1], colour[2]), image, min(max(opacity, 0.0), 1.0))
+    return _Converter(root, document).stage() if root is not None else None
+
+
+def material_named(stage: Usd.Stage, name: str) -> UsdShade.Material | None:
+    """A material of a converted document by its name there."""
+    material = UsdShade.Material(stage.GetPrimAtPath(Sdf.Path("/").AppendChild(Tf.MakeValidIdentifier(name))))
+    return material if material else None
 
 
 def referenced_files(document: Path) -> Iterator[Path]:
     """Every file that a document names, for the scene's digest."""
     root = _parse(document)
-    for node in root.iter("input") if root is not None else ():
-        if node.get("type") == "filename" and node.get("value"):
-            yield document.parent / str(node.get("value"))
+    for top in root if root is not None else ():
+        for node in top.iter("input"):
+            if node.get("type") == "filename" and node.get("value"):
+                yield document.parent / _prefixed(root, top, str(node.get("value")))
 
 
-def _parse(document: Path) -> ElementTree.Element | None:
+def _parse(document: Path) -> Element | None:
     try:
         return ElementTree.parse(document).getroot()
     except (OSError, ElementTree.ParseError):
         return None
 
 
-def _named(
-    root: ElementTree.Element, name: str | ElementTree.Element | None, attribute: str = ""
-) -> ElementTree.Element | None:
-    """The child of that name, or of the name in an attribute of the given element."""
-    wanted = name.get(attribute) if isinstance(name, ElementTree.Element) else name
-    return next((child for child in root if child.get("name") == wanted), None) if wanted else None
+def _prefixed(root: Element | None, top: Element, value: str) -> str:
+    """A file's name after the `fileprefix` of the root's child it is in, or of the root."""
+    return top.get("fileprefix", root.get("fileprefix", "") if root is not None else "") + value
 
 
-def _input(node: ElementTree.Element | None, name: str) -> ElementTree.Element | None:
-    if node is None or not name:
-        return None
-    return next((child for child in node if child.tag == "input" and child.get("name") == name), None)
+class _Converter:
+    """Makes the stage: first all prims, then their inputs, which may name any of them."""
+
+    def __init__(self, root: Element, document: Path) -> None:
+        self._root = root
+        self._document = document
+        self._stage = Usd.Stage.CreateInMemory()
+
+    def stage(self) -> Usd.Stage:
+        """The document as a stage."""
+        top = Sdf.Path("/")
+        for element in self._root:
+            self._define(element, top)
+            for child in element if element.tag == GRAPH else ():
+                self._define(child, _below(top, element))
+        for element in self._root:
+            self._connect(element, top, element)
+            for child in element if element.tag == GRAPH else ():
+                self._connect(child, _below(top, element), element)
+        return self._stage
+
+    def _define(self, element: Element, parent: Sdf.Path) -> None:
+        if not element.get("name") or not (element.get("type") or element.tag == GRAPH) or element.tag in _FIELDS:
+            return
+        path = _below(parent, element)
+        if element.tag == MATERIAL:
+            UsdShade.Material.Define(self._stage, path)
+        elif element.tag == GRAPH:
+            UsdShade.NodeGraph.Define(self._stage, path)
+        else:
+            shader = UsdShade.Shader.Define(self._stage, path)
+            shader.CreateIdAttr(f"ND_{element.tag}_{element.get('type')}")
+
+    def _connect(self, element: Element, parent: Sdf.Path, top: Element) -> None:
+        """Values and connections of an element's inputs; a node graph's outputs."""
+        if element.tag == "output":
+            self._output(element, parent)
+            return
+        prim = self._stage.GetPrimAtPath(_below(parent, element)) if element.get("name") else None
+        if not prim:
+            return
+        for field in element:
+            if field.tag == "input" and field.get("name"):
+                self._input(prim, field, parent, top)
+
+    def _output(self, element: Element, graph: Sdf.Path) -> None:
+        prim = self._stage.GetPrimAtPath(graph)
+        kind = _TYPES.get(str(element.get("type")))
+        source = self._source(element, graph)
+        if prim and kind is not None and source is not None:
+            UsdShade.NodeGraph(prim).CreateOutput(str(element.get("name")), kind).ConnectToSource(source)
+
+    def _input(self, prim: Usd.Prim, field: Element, parent: Sdf.Path, top: Element) -> None:
+        name = str(field.get("name"))
+        if prim.IsA(UsdShade.Material):
+            source = self._source(field, parent)
+            if name == "surfaceshader" and source is not None:
+                UsdShade.Material(prim).CreateSurfaceOutput().ConnectToSource(source)
+            return
+        kind = _TYPES.get(str(field.get("type")))
+        if kind is None:
+            return
+        made = UsdShade.ConnectableAPI(prim).CreateInput(name, kind)
+        source = self._source(field, parent)
+        if source is not None:
+            made.ConnectToSource(source)
+        elif field.get("value") is not None:
+            self._set(made, field, top)
+
+    def _source(self, field: Element, scope: Sdf.Path) -> UsdShade.ConnectionSourceInfo | None:
+        """Where an input's or output's value comes from; None where that is no connection, or leads nowhere."""
+        if field.get("interfacename"):
+            graph = UsdShade.ConnectableAPI(self._stage.GetPrimAtPath(scope))
+            given = graph.GetInput(str(field.get("interfacename"))) if graph else None
+            return UsdShade.ConnectionSourceInfo(given) if given else None
+        name = field.get("nodegraph") or field.get("nodename")
+        if not name:
+            return None
+        above = Sdf.Path("/") if field.get("nodegraph") else scope
+        node = UsdShade.ConnectableAPI(self._stage.GetPrimAtPath(above.AppendChild(Tf.MakeValidIdentifier(name))))
+        if not node:
+            return None
+        kind = _TYPES.get(str(field.get("type")), Sdf.ValueTypeNames.Token)
+        output = node.CreateOutput(field.get("output") or "out", kind)
+        return UsdShade.ConnectionSourceInfo(output)
+
+    def _set(self, made: UsdShade.Input, field: Element, top: Element) -> None:
+        text = str(field.get("value"))
+        kind = field.get("type")
+        if kind == "filename":
+            file = self._document.parent / _prefixed(self._root, top, text)
+            made.Set(Sdf.AssetPath(str(file)))
+            space = field.get("colorspace") or top.get("colorspace") or self._root.get("colorspace")
+            made.GetAttr().SetColorSpace(space or "")
+        elif kind in ("string", "boolean"):
+            made.Set(text if kind == "string" else text == "true")
+        else:
+            size = int(str(kind)[-1]) if str(kind)[-1].isdigit() else 1
+            numbers = _numbers(text, size)
+            if numbers is not None:
+                made.Set(numbers if size > 1 else numbers[0])
 
 
-def _numbers(node: ElementTree.Element | None, size: int, default: tuple[float, ...]) -> tuple[float, ...]:
-    """The first `size` numbers of an input's value, one number repeated."""
+_FIELDS = ("input", "output", "look", "nodedef", "materialassign")
+"""Elements that are no nodes."""
+
+
+def _below(parent: Sdf.Path, element: Element) -> Sdf.Path:
+    return parent.AppendChild(Tf.MakeValidIdentifier(str(element.get("name"))))
+
+
+def _numbers(text: str, size: int) -> tuple[float, ...] | None:
+    """The `size` numbers of a value, one number repeated; None if they are not that many."""
     try:
-        values = [float(x) for x in str(node.get("value") if node is not None else "").split(",")]
+        values = [float(x) for x in text.split(",")]
     except ValueError:
-        return default
-    return tuple((values * size)[:size]) if len(values) in (1, size) else tuple(values[:size])
-
-
-def _image(root: ElementTree.Element, node: ElementTree.Element | None, folder: Path) -> Path | None:
-    """The file of the image node that an input is connected to, directly or through a node graph's output."""
-    if node is None:
         return None
-    scope = _named(root, node, "nodegraph")
-    if scope is not None:
-        source = _named(scope, _named(scope, node, "output"), "nodename")
-    else:
-        source = _named(root, node, "nodename")
-    if source is None or source.tag not in ("image", "tiledimage"):
-        return None
-    file = _input(source, "file")
-    name = file.get("value") if file is not None else None
-    return folder / name if name else None
+    values = values * size if len(values) == 1 else values
+    return tuple(values) if len(values) == size else None

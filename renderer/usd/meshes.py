@@ -1,89 +1,97 @@
-"""Meshes and gprims as one kind of shape: points, topology, normals."""
+"""Meshes: points, topology, subdivision, normals."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
-from renderer.usd.gprims import gprim_surface
-from renderer.usd.primvars import PrimvarReader, as_rows
-from renderer.usd.stage import WarningLog
+from renderer.usd.normals import creased_normals, face_normals, unit_rows, vertex_normals
+from renderer.usd.primvars import MeshLayout, PrimvarReader
+from renderer.usd.refine import RefinedLayout, refine
+from renderer.usd.shape import Reading, Shape, floats, integers
+from renderer.usd.sharpness import Cage
 from renderer.usd.topology import Attribute, Topology, triangulate
-from schemas.problem import ExitCode, Problem
-
-CREASE = 30.0
-"""Degrees between a face and the mean at its point beyond which the point is sharp."""
 
 
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """A surface in its prim's own space.
-
-    Attributes:
-        points: float64 [P, 3], stage units.
-        topology: Its polygons.
-        normals: Unit normals; domain `uniform` (flat), `vertex`, `constant` or `corner`.
-        primvars: Reads further attributes of the same mesh.
-    """
-
-    points: NDArray[np.float64]
-    topology: Topology
-    normals: Attribute
-    primvars: PrimvarReader
-
-
-def read_shape(prim: Usd.Prim, time: Usd.TimeCode, log: WarningLog) -> Shape | None:
-    """The shape of a Mesh or of an implicit gprim; None, with a warning, where there is nothing to draw.
+def mesh_shape(prim: Usd.Prim, reading: Reading) -> Shape | None:
+    """The shape of a Mesh; None, with a warning, where there is nothing to draw.
 
     Raises:
-        Problem: A point is NaN or infinite.
+        Problem: A point is NaN or infinite, or subdivision makes too many faces.
     """
-    if prim.IsA(UsdGeom.Mesh):
-        return _mesh_shape(prim, time, log)
-    surface = gprim_surface(prim, time)
-    if surface is None:
-        log.add(f"{prim.GetTypeName()} prims are not drawn", prim.GetPath())
-        return None
-    _check_finite(surface.points, prim)
-    topology = triangulate(len(surface.points), surface.counts, surface.corners)
-    reader = PrimvarReader(prim, topology, time, log)
-    return Shape(surface.points, topology, surface.normals, reader)
-
-
-def _mesh_shape(prim: Usd.Prim, time: Usd.TimeCode, log: WarningLog) -> Shape | None:
-    mesh = UsdGeom.Mesh(prim)
-    points = _floats(mesh.GetPointsAttr().Get(time))
-    counts = _integers(mesh.GetFaceVertexCountsAttr().Get(time))
-    corners = _integers(mesh.GetFaceVertexIndicesAttr().Get(time))
+    mesh, time, log = UsdGeom.Mesh(prim), reading.time, reading.log
+    points = floats(mesh.GetPointsAttr().Get(time))
+    counts = integers(mesh.GetFaceVertexCountsAttr().Get(time))
+    corners = integers(mesh.GetFaceVertexIndicesAttr().Get(time))
     if not len(points) or not len(corners):
         log.add("the mesh is empty", prim.GetPath())
         return None
-    _check_finite(points, prim)
+    points = reading.posed(points, prim)
     left_handed = mesh.GetOrientationAttr().Get(time) == UsdGeom.Tokens.leftHanded
-    holes = _integers(mesh.GetHoleIndicesAttr().Get(time))
+    holes = integers(mesh.GetHoleIndicesAttr().Get(time))
     try:
-        topology = triangulate(len(points), counts, corners, left_handed=left_handed, holes=holes)
+        topology = triangulate(len(points), counts, corners, left_handed=left_handed, holes=holes, places=points)
     except ValueError as error:
         log.add(f"the mesh is left out, its {error}", prim.GetPath())
         return None
-    reader = PrimvarReader(prim, topology, time, log)
-    smooth = mesh.GetSubdivisionSchemeAttr().Get(time) != UsdGeom.Tokens.none
-    authored = None if smooth else _authored_normals(mesh, reader)
-    return Shape(points, topology, _complete(authored, points, topology, smooth), reader)
+    scheme = str(mesh.GetSubdivisionSchemeAttr().Get(time))
+    if scheme != UsdGeom.Tokens.none and reading.refine > 0:
+        shape = _refined(mesh, scheme, points, topology, left_handed, reading)
+        if shape is not None:
+            return shape
+    reader = PrimvarReader(prim, MeshLayout(topology), time, log)
+    smooth = scheme != UsdGeom.Tokens.none
+    authored = None if smooth else _authored_normals(mesh, reader, topology, reading)
+    return Shape(points, topology, _complete(authored, points, topology, smooth), reader, len(counts))
 
 
-def _authored_normals(mesh: UsdGeom.Mesh, reader: PrimvarReader) -> Attribute | None:
-    """`primvars:normals`, else `normals`; USD ignores both on subdivision surfaces."""
+def _refined(
+    mesh: UsdGeom.Mesh,
+    scheme: str,
+    points: NDArray[np.float64],
+    topology: Topology,
+    left_handed: bool,
+    reading: Reading,
+) -> Shape | None:
+    """The mesh after `reading.refine` levels of its scheme; None where the scheme cannot be applied to it."""
+    prim, time = mesh.GetPrim(), reading.time
+    cage = Cage(
+        topology.points,
+        topology.counts,
+        topology.corners,
+        holes=integers(mesh.GetHoleIndicesAttr().Get(time)),
+        boundary=str(mesh.GetInterpolateBoundaryAttr().Get(time)),
+        creases=integers(mesh.GetCreaseIndicesAttr().Get(time)),
+        crease_lengths=integers(mesh.GetCreaseLengthsAttr().Get(time)),
+        crease_sharpnesses=_numbers(mesh.GetCreaseSharpnessesAttr().Get(time)),
+        corner_points=integers(mesh.GetCornerIndicesAttr().Get(time)),
+        corner_sharpnesses=_numbers(mesh.GetCornerSharpnessesAttr().Get(time)),
+    )
+    try:
+        refined = refine(cage, scheme, reading.refine)
+    except ValueError as error:
+        reading.log.add(f"the mesh is not refined, {error}", prim.GetPath())
+        return None
+    moved = refined.vertex(points)
+    fine = triangulate(len(moved), refined.counts, refined.corners, left_handed=left_handed, holes=refined.holes)
+    reader = PrimvarReader(prim, RefinedLayout(topology, refined), time, reading.log)
+    return Shape(moved, fine, vertex_normals(moved, fine), reader, len(topology.counts), refined.parents)
+
+
+def _authored_normals(
+    mesh: UsdGeom.Mesh, reader: PrimvarReader, topology: Topology, reading: Reading
+) -> Attribute | None:
+    """`primvars:normals`, else `normals`, as the skin turns them; USD ignores both on subdivision surfaces."""
     own = UsdGeom.PrimvarsAPI(mesh.GetPrim()).GetPrimvar("normals")
     if own and own.HasAuthoredValue():
-        return reader.read("normals", 3)
-    values = mesh.GetNormalsAttr().Get(reader.time)
-    if values is None or len(values) == 0:
-        return None
-    return reader.fit("normals", values, str(mesh.GetNormalsInterpolation()), 3)
+        found = reader.read("normals", 3)
+    else:
+        values = mesh.GetNormalsAttr().Get(reader.time)
+        if values is None or len(values) == 0:
+            return None
+        found = reader.fit("normals", values, str(mesh.GetNormalsInterpolation()), 3)
+    return found if found is None or reading.skin is None else reading.skin.normals(found, topology)
 
 
 def _complete(authored: Attribute | None, points: NDArray[np.float64], topology: Topology, smooth: bool) -> Attribute:
@@ -99,66 +107,5 @@ def _complete(authored: Attribute | None, points: NDArray[np.float64], topology:
     return Attribute(unit_rows(np.where(bad[:, None], computed, given)), "corner")
 
 
-def _area_vectors(points: NDArray[np.float64], topology: Topology) -> NDArray[np.float64]:
-    """Twice the area times the normal of each triangle, float64 [T, 3]."""
-    a, b, c = (points[topology.corners[topology.triangles[:, i]]] for i in range(3))
-    return np.cross(b - a, c - a)
-
-
-def _sum_by(keys: NDArray[np.int64], vectors: NDArray[np.float64], size: int) -> NDArray[np.float64]:
-    return np.stack([np.bincount(keys, vectors[:, axis], minlength=size) for axis in range(3)], axis=1)
-
-
-def face_normals(points: NDArray[np.float64], topology: Topology) -> Attribute:
-    """Unit normal of each face: the sum of its triangles' area vectors, which is Newell's normal."""
-    sums = _sum_by(topology.face_of_triangle, _area_vectors(points, topology), len(topology.counts))
-    return Attribute(unit_rows(sums), "uniform")
-
-
-def vertex_normals(points: NDArray[np.float64], topology: Topology) -> Attribute:
-    """Unit normal of each point: the area-weighted mean of its triangles."""
-    area = _area_vectors(points, topology)
-    corners = topology.corners[topology.triangles]
-    sums = _sum_by(corners.ravel(), np.repeat(area, 3, axis=0), topology.points)
-    return Attribute(unit_rows(sums), "vertex")
-
-
-def creased_normals(points: NDArray[np.float64], topology: Topology) -> Attribute:
-    """Unit normals of polygons that have none: a point's mean where all its faces are within CREASE of it, else flat.
-
-    USD leaves such polygons flat. Tessellated curves look, and compress, better with this; boxes stay flat.
-    """
-    flat = topology.spread(face_normals(points, topology), "corner")
-    smooth = topology.spread(vertex_normals(points, topology), "corner")
-    far = np.einsum("ij,ij->i", flat, smooth) < np.cos(np.radians(CREASE))
-    sharp = np.bincount(topology.corners, far, minlength=topology.points) > 0
-    return Attribute(np.where(sharp[topology.corners][:, None], flat, smooth), "corner")
-
-
-def unit_rows(vectors: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Rows scaled to unit length, float32 [n, 3]; a zero row becomes +z, so that shading stays finite."""
-    rows = np.asarray(vectors, dtype=np.float64)
-    largest = np.abs(rows).max(axis=1, keepdims=True)
-    rows = np.divide(rows, largest, out=np.zeros_like(rows), where=largest > 0)
-    rows[largest[:, 0] == 0, 2] = 1.0
-    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True), dtype=np.float32)
-
-
-def _floats(values: object) -> NDArray[np.float64]:
-    rows = None if values is None else as_rows(values, 3)
-    with np.errstate(invalid="ignore"):
-        return np.zeros((0, 3)) if rows is None else rows.astype(np.float64)
-
-
-def _integers(values: object) -> NDArray[np.int64]:
-    return np.zeros(0, np.int64) if values is None else np.asarray(values, dtype=np.int64)
-
-
-def _check_finite(points: NDArray[np.float64], prim: Usd.Prim) -> None:
-    bad = int(np.count_nonzero(~np.isfinite(points).all(axis=1)))
-    if bad:
-        raise Problem(
-            f"{bad} of the points of {prim.GetPath()} are NaN or infinite.",
-            "Repair that mesh, or deactivate the prim.",
-            ExitCode.USAGE,
-        )
+def _numbers(values: object) -> NDArray[np.float64]:
+    return np.zeros(0) if values is None else np.asarray(values, dtype=np.float64).reshape(-1)

@@ -1,8 +1,9 @@
-"""Primvars as attributes of a mesh, at every interpolation, indexed or not, inherited or not."""
+"""Primvars as attributes of a surface, at every interpolation, indexed or not, inherited or not."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,19 +21,44 @@ DOMAINS: dict[str, Domain] = {
 }
 
 
+class Layout(Protocol):
+    """Which values belong to what of a prim, and where they end up on its surface."""
+
+    def sizes(self) -> dict[str, int]:
+        """How many values each interpolation has."""
+
+    def carry(self, values: NDArray[np.float32], interpolation: str) -> Attribute:
+        """As many values as `sizes` says, float32 [n, width], on the surface that is drawn."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeshLayout:
+    """Values of a mesh that is drawn as it is authored."""
+
+    topology: Topology
+
+    def sizes(self) -> dict[str, int]:
+        """See Layout."""
+        return {name: self.topology.rows(domain) for name, domain in DOMAINS.items()}
+
+    def carry(self, values: NDArray[np.float32], interpolation: str) -> Attribute:
+        """See Layout."""
+        return Attribute(values, DOMAINS[interpolation])
+
+
 @dataclass(frozen=True, slots=True)
 class PrimvarReader:
     """Reads primvars of one prim at one time.
 
     Attributes:
         prim: The gprim; constant primvars are inherited from its ancestors.
-        topology: The mesh whose faces, points and corners the values belong to.
+        layout: What the values belong to.
         time: The time to read at.
         log: Gets a line for every primvar that does not fit.
     """
 
     prim: Usd.Prim
-    topology: Topology
+    layout: Layout
     time: Usd.TimeCode
     log: WarningLog
 
@@ -59,13 +85,15 @@ class PrimvarReader:
         return None
 
     def fit(self, name: str, values: object, interpolation: str, width: int) -> Attribute | None:
-        """Raw values as an attribute; None, with a warning, where shape or length do not fit the mesh."""
+        """Raw values as an attribute; None, with a warning, where shape or length do not fit the prim."""
         rows = as_rows(values, width)
-        domain = DOMAINS.get(interpolation, "constant")
         if rows is None or len(rows) == 0:
             return None
-        wanted = self.topology.rows(domain)
-        if len(rows) != wanted and domain == "constant":
+        sizes = self.layout.sizes()
+        if interpolation not in sizes:
+            interpolation = "constant"
+        wanted = sizes[interpolation]
+        if len(rows) != wanted and interpolation == "constant":
             rows = rows[:1]
         elif len(rows) != wanted:
             self.log.add(
@@ -76,7 +104,7 @@ class PrimvarReader:
         if not np.all(np.isfinite(rows)):
             self.log.add(f"{name} has values that are not finite; ignored", self.prim.GetPath())
             return None
-        return Attribute(rows, domain)
+        return self.layout.carry(rows, interpolation)
 
 
 def as_rows(values: object, width: int) -> NDArray[np.float32] | None:

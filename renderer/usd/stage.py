@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
-from pxr import Tf, Usd, UsdUtils
+from pxr import Sdf, Tf, Usd, UsdUtils
 
 from schemas.problem import ExitCode, Problem
 
@@ -91,8 +92,8 @@ def open_stage(path: Path, variants: tuple[str, ...] = ()) -> Usd.Stage:
             "Open it with usdview or usdcat, or export it again.",
             ExitCode.USAGE,
         ) from error
-    for selection in variants:
-        _select_variant(stage, selection)
+    if variants:
+        _select_variants(stage, [Selection.of(text) for text in variants])
     return stage
 
 
@@ -104,9 +105,14 @@ def stage_time(stage: Usd.Stage, time: float | None) -> Usd.TimeCode:
     """
     if time is not None:
         return Usd.TimeCode(time)
-    if stage.HasAuthoredTimeCodeRange():
+    if stage.HasAuthoredMetadata("startTimeCode"):
         return Usd.TimeCode(stage.GetStartTimeCode())
     return Usd.TimeCode.EarliestTime()
+
+
+def canonical_path(prim: Usd.Prim) -> Sdf.Path:
+    """The prim's path, in its prototype if it is an instance proxy."""
+    return (prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim).GetPath()
 
 
 def usd_reason(error: Exception) -> str:
@@ -121,29 +127,72 @@ def usd_reason(error: Exception) -> str:
     return re.sub(r"\s+", " ", text).strip().rstrip(".")[:300]
 
 
-def _select_variant(stage: Usd.Stage, selection: str) -> None:
-    where, _, rest = selection.rpartition(":")
-    name, equals, choice = rest.partition("=")
-    if not equals or not name:
-        raise Problem(
-            f"'{selection}' is not a variant selection.",
-            "Write it as set=choice or /prim/path:set=choice.",
-            ExitCode.USAGE,
-        )
-    found: dict[str, list[str]] = {}
-    applied = False
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """A choice of variant: for the prim at `where`, or for every prim that has the set if that is empty."""
+
+    where: str
+    name: str
+    choice: str
+
+    @staticmethod
+    def of(text: str) -> Selection:
+        """Reads `set=choice` or `/prim/path:set=choice`.
+
+        Raises:
+            Problem: It is neither.
+        """
+        where, _, rest = text.rpartition(":")
+        name, equals, choice = rest.partition("=")
+        if not equals or not name:
+            raise Problem(
+                f"'{text}' is not a variant selection.",
+                "Write it as set=choice or /prim/path:set=choice.",
+                ExitCode.USAGE,
+            )
+        return Selection(where, name, choice)
+
+    def __str__(self) -> str:
+        return f"{self.where}{':' if self.where else ''}{self.name}={self.choice}"
+
+
+def _select_variants(stage: Usd.Stage, selections: list[Selection]) -> None:
+    """Selects in the session layer; where several fit a prim, the last one."""
+    found: dict[str, set[str]] = {}
+    applied: set[Selection] = set()
+    made: set[tuple[str, str]] = set()
     with Usd.EditContext(stage, stage.GetSessionLayer()):
-        # The list is made first: a selection changes the prims that a running traversal would visit.
-        for prim in list(stage.TraverseAll()):
-            if where and str(prim.GetPath()) != where:
-                continue
-            for set_name in prim.GetVariantSets().GetNames() if prim else ():
-                found[set_name] = list(prim.GetVariantSet(set_name).GetVariantNames())
-                if set_name == name and choice in found[set_name]:
-                    prim.GetVariantSet(name).SetVariantSelection(choice)
-                    applied = True
-    if not applied:
-        known = "; ".join(f"{key}={'|'.join(values)}" for key, values in sorted(found.items())) or "none"
-        raise Problem(
-            f"The scene has no variant '{selection}'.", f"Choose from what is there: {known}.", ExitCode.NOT_FOUND
-        )
+        # A selection can bring prims and sets that were not there before, and those may be selected too.
+        while _select_once(stage, selections, found, applied, made):
+            pass
+    for selection in selections:
+        if selection not in applied:
+            known = "; ".join(f"{key}={'|'.join(sorted(values))}" for key, values in sorted(found.items())) or "none"
+            raise Problem(
+                f"The scene has no variant '{selection}'.", f"Choose from what is there: {known}.", ExitCode.NOT_FOUND
+            )
+
+
+def _select_once(
+    stage: Usd.Stage,
+    selections: list[Selection],
+    found: dict[str, set[str]],
+    applied: set[Selection],
+    made: set[tuple[str, str]],
+) -> bool:
+    """Goes over the stage once; whether anything changed. `made` are prims and sets that are done."""
+    changed = False
+    # The list is made first: a selection changes the prims that a running traversal would visit.
+    for prim in list(stage.TraverseAll()):
+        mine = [s for s in selections if not s.where or str(prim.GetPath()) == s.where] if prim else []
+        for name in prim.GetVariantSets().GetNames() if mine else ():
+            variants = prim.GetVariantSet(name)
+            choices = variants.GetVariantNames()
+            found.setdefault(name, set()).update(choices)
+            fitting = [s for s in mine if s.name == name and s.choice in choices]
+            applied.update(fitting)
+            if fitting and (str(prim.GetPath()), name) not in made:
+                made.add((str(prim.GetPath()), name))
+                changed = changed or variants.GetVariantSelection() != fitting[-1].choice
+                variants.SetVariantSelection(fitting[-1].choice)
+    return changed

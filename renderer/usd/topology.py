@@ -8,6 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.usd.ears import clip_ears
+
 Domain = Literal["constant", "uniform", "vertex", "corner"]
 
 
@@ -71,8 +73,9 @@ def triangulate(
     *,
     left_handed: bool = False,
     holes: NDArray[np.int64] | None = None,
+    places: NDArray[np.float64] | None = None,
 ) -> Topology:
-    """Fan triangulation of every face that has at least three corners and is not a hole.
+    """Triangles of every face that has at least three corners and is not a hole: fans, as Hydra makes them.
 
     Args:
         points: Number of points.
@@ -80,6 +83,8 @@ def triangulate(
         corners: int64 [C], C = sum of counts, each in [0, points).
         left_handed: Whether faces wind clockwise seen from outside (USD `orientation`).
         holes: Indices of faces that are left out.
+        places: float64 [points, 3], where the points are; with them, concave faces whose fan would reach outside the
+            face are cut into ears instead.
 
     Raises:
         ValueError: The counts do not match the corners, or a corner names no point.
@@ -96,6 +101,42 @@ def triangulate(
     first_fan = np.cumsum(fans) - fans
     step = np.arange(len(face)) - first_fan[face]
     start = first_corner[face]
-    second, third = (2, 1) if left_handed else (1, 2)
-    triangles = np.stack((start, start + step + second, start + step + third), axis=1)
-    return Topology(points, counts, corners, triangles.astype(np.int64), face)
+    triangles = np.stack((start, start + step + 1, start + step + 2), axis=1).astype(np.int64)
+    if places is not None:
+        folded = np.flatnonzero(_folded(places, corners, triangles, face, fans))
+        triangles = clip_ears(places, corners, triangles, first_corner[folded], counts[folded], first_fan[folded])
+    if left_handed:
+        triangles = triangles[:, [0, 2, 1]]
+    return Topology(points, counts, corners, triangles, face)
+
+
+def _folded(
+    places: NDArray[np.float64],
+    corners: NDArray[np.int64],
+    triangles: NDArray[np.int64],
+    face: NDArray[np.int64],
+    fans: NDArray[np.int64],
+) -> NDArray[np.bool_]:
+    """Which faces have a triangle in their fan that is turned against the face, bool [F]."""
+    several = np.flatnonzero(fans[face] > 1)
+    owner = face[several]
+    area = area_vectors(places, corners[triangles[several]])
+    whole = sum_by(owner, area, len(fans))
+    along = np.einsum("ij,ij->i", area, whole[owner])
+    # What a face warps by is no fold; neither is rounding.
+    against = along < -1e-6 * np.einsum("ij,ij->i", whole, whole)[owner]
+    return np.asarray(np.bincount(owner, against, minlength=len(fans)) > 0)
+
+
+def area_vectors(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Twice the area times the normal of each triangle of points, float64 [T, 3]."""
+    a = points[triangles[:, 0]]
+    u, v = points[triangles[:, 1]] - a, points[triangles[:, 2]] - a
+    # Written out: numpy's own cross product takes three times as long.
+    columns = [u[:, i - 2] * v[:, i - 1] - u[:, i - 1] * v[:, i - 2] for i in range(3)]
+    return np.stack(columns, axis=1)
+
+
+def sum_by(keys: NDArray[np.int64], vectors: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    """Sums of the rows with the same key, float64 [size, 3]."""
+    return np.stack([np.bincount(keys, vectors[:, axis], minlength=size) for axis in range(3)], axis=1)

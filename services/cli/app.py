@@ -21,14 +21,17 @@ from schemas.problem import ExitCode, Problem
 from services.cli import (
     build,
     datasets,
+    dump,
     health,
     jobs,
     keys,
     measurements,
     models,
     output,
+    render,
     retrain,
     samples,
+    scene,
     scenes,
     serve,
     worker,
@@ -44,6 +47,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command("build")(build.build)
+app.command("render")(render.render)
+app.command("dump")(dump.dump)
+app.add_typer(scene.app, name="scene")
 app.command("samples")(samples.samples)
 app.command("serve")(serve.serve)
 app.command("worker")(worker.worker)

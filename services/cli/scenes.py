@@ -13,7 +13,10 @@ from services.cli.lines import plain, print_columns, size
 from services.cli.server import DEFAULT_URL, KeyFileOption, LimitOption, UrlOption, connect
 from services.cli.state import JsonOption
 
-app = typer.Typer(help="Scenes on a server: upload, list, show.", no_args_is_help=True)
+app = typer.Typer(
+    help="Scenes on a server: upload, list, show. (`diaphane scene` is about files on this machine.)",
+    no_args_is_help=True,
+)
 
 
 @app.command()

@@ -9,9 +9,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from renderer.frame import Frame
-from renderer.techniques import KBuffer, KBufferDeep, KBufferImportance, KBufferOptimal
+from renderer.techniques import Budget, KBuffer, KBufferDeep, KBufferImportance, KBufferOptimal
 from schemas.measurement import Measurement
 from services.stages.desk import Desk, save_facts
 from services.stages.label import optimal
@@ -38,13 +39,11 @@ def _baseline(session: Session, shots: list[Shot], report: Report) -> list[Measu
     measured = [Shot(session, shots[0].folder, total / session.frame.pixels, total).take_exact()]
     for number, shot in enumerate(shots, start=1):
 
-        def oracle(frame: Frame, fragments: int = shot.fragments) -> KBufferOptimal:
+        def oracle(frame: Frame, _: Budget, fragments: int = shot.fragments) -> NDArray[np.int32]:
             full_size = frame is session.frame
-            return KBufferOptimal(optimal(labels, fragments) if full_size else np.ones(frame.pixels, np.int32))
+            return optimal(labels, fragments) if full_size else np.ones(frame.pixels, np.int32)
 
-        measured.append(shot.take(KBuffer.name, lambda _: KBuffer()))
-        measured.append(shot.take(KBufferImportance.name, lambda _: KBufferImportance()))
-        measured.append(shot.take(KBufferOptimal.name, oracle))
+        measured += [shot.take(technique) for technique in (KBuffer(), KBufferImportance(), KBufferOptimal(oracle))]
         report(number / len(shots), f"{number} of {len(shots)} budgets")
     return measured
 
@@ -53,6 +52,6 @@ def _bundle(shots: list[Shot], bundle: Path, report: Report) -> list[Measurement
     technique = KBufferDeep(bundle)
     measured = []
     for number, shot in enumerate(shots, start=1):
-        measured.append(shot.take(technique.name, lambda _: technique))
+        measured.append(shot.take(technique))
         report(number / len(shots), f"{number} of {len(shots)} budgets")
     return measured

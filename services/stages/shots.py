@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -63,15 +62,14 @@ class Session:
         width, height = self.task.params["size"]
         return display8(composite(self.dump, k, self.tail, self.g).reshape(height, width, 3))
 
-    def render(self, make: Callable[[Frame], Technique], budget: Budget) -> Rendered:
+    def render(self, technique: Technique, budget: Budget) -> Rendered:
         """A technique's picture; drivers compile shaders at their first use, so that is not the one measured."""
-        technique = make(self.frame)
         compiled = self.desk.compiled(self.task)
         if technique.name not in compiled:
             compiled.add(technique.name)
             small = Frame(self.desk.gpu(self.task), View.model_validate(self.task.params["view"]), *_WARM_SIZE)
             share = max(1, budget.fragments * small.pixels // self.frame.pixels)
-            make(small).render(small, Budget(share, budget.tail, budget.g))
+            technique.render(small, Budget(share, budget.tail, budget.g))
         return technique.render(self.frame, budget)
 
 
@@ -91,26 +89,26 @@ class Shot:
     factor: float
     fragments: int
 
-    def take(self, name: str, make: Callable[[Frame], Technique]) -> Measurement:
-        """Render with the technique that `make` gives for a frame, compare, keep the pictures."""
+    def take(self, technique: Technique) -> Measurement:
+        """Render, compare, keep the pictures."""
         if self.fragments >= self.session.dump.total:
             why = "the budget holds every fragment: every technique is exact"
-            return self._record(name, exact=True, skipped=why, mse=0.0)
-        return self._take(name, make, exact=False)
+            return self._record(technique.name, exact=True, skipped=why, mse=0.0)
+        return self._take(technique, exact=False)
 
     def take_exact(self) -> Measurement:
         """Render with all fragments: what it costs is the memory it needs."""
-        return self._take(SBuffer.name, lambda _: SBuffer(), exact=True)
+        return self._take(SBuffer(), exact=True)
 
-    def _take(self, name: str, make: Callable[[Frame], Technique], exact: bool) -> Measurement:
+    def _take(self, technique: Technique, exact: bool) -> Measurement:
         try:
-            rendered = self.session.render(make, Budget(self.fragments, self.session.tail, self.session.g))
+            rendered = self.session.render(technique, Budget(self.fragments, self.session.tail, self.session.g))
         except Problem as problem:
             if problem.code != ExitCode.LIMIT:
                 raise
             # More fragments than a storage buffer holds: the others can still be measured.
-            return self._record(name, exact=exact, skipped=problem.title)
-        return self._measure(name, rendered, exact)
+            return self._record(technique.name, exact=exact, skipped=problem.title)
+        return self._measure(technique.name, rendered, exact)
 
     def _measure(self, name: str, rendered: Rendered, exact: bool) -> Measurement:
         image, reference = display8(rendered.linear), self.session.exact
@@ -132,7 +130,9 @@ class Shot:
             k_max=int(rendered.k.max()),
             captured_fragments=rendered.captured,
             pool_bytes=rendered.pool_bytes,
+            pixel_bytes=rendered.pixel_bytes,
             total_bytes=rendered.total_bytes,
+            skips=dict(rendered.skips),
             passes=rendered.passes,
             total_ms=rendered.milliseconds,
             cpu_difference=difference,

@@ -19,12 +19,13 @@ EvaluationKind = Literal["baseline", "bundle"]
 _SOURCES: Mapping[StageName, tuple[str, ...]] = {
     "scene": (
         *("schemas.scene", "schemas.view", "schemas.colour"),
-        *("renderer.scene", "renderer.usd", "renderer.views", "renderer.convert"),
+        *("renderer.scene", "renderer.usd", "renderer.views", "renderer.convert", "renderer.authoring"),
         "services.stages.scenes",
     ),
     "render": (
         "schemas.fragments",
-        *(f"renderer.{name}" for name in ("capture", "csr", "dump", "frame", "gpu_scene", "programs")),
+        *(f"renderer.{name}" for name in ("capture", "csr", "culling", "dump", "fragment_list")),
+        *(f"renderer.{name}" for name in ("frame", "gpu_scene", "programs")),
         *(f"renderer.shaders.{name}" for name in ("common", "opaque", "count", "gather", "capture")),
         "services.stages.render",
     ),
@@ -38,12 +39,16 @@ _SOURCES: Mapping[StageName, tuple[str, ...]] = {
     ),
     "export": (
         *(f"trainer.{name}" for name in ("bundle", "export_glsl", "export_onnx", "parity")),
+        "renderer.onnx_network",
         "schemas.bundle",
         "services.stages.export",
     ),
     "evaluate": (
         "labeller.curves",
-        *(f"renderer.{name}" for name in ("allocation", "features", "metrics", "shaders", "techniques")),
+        *(
+            f"renderer.{name}"
+            for name in ("allocation", "features", "metrics", "onnx_network", "screen", "shaders", "techniques")
+        ),
         *(f"services.stages.{name}" for name in ("evaluate", "shots", "pictures")),
     ),
     "report": ("services.report", "services.templates", "services.summary", "services.stages.report"),

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import moderngl
 import numpy as np
 import pytest
 from support.scenes import SIZE, VIEW, shells
 
-from renderer.capture import capture, row_bands
+from labeller.curves import composite
+from renderer.bands import row_bands
+from renderer.capture import capture
 from renderer.csr import offsets_of
+from renderer.culling import Ranges
 from renderer.features import gather
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
+from renderer.hidden import hidden_fragments
+from renderer.techniques import Budget, SBuffer
 from schemas.fragments import FragmentDump
+from schemas.problem import Problem
+from schemas.scene import Batch
 
 
 def test_dump_is_sorted_by_depth_then_colour_inside_every_pixel(dump: FragmentDump) -> None:
@@ -39,12 +48,89 @@ def test_dump_is_identical_from_frame_to_frame_and_for_any_bands(
     ctx: moderngl.Context, dump: FragmentDump, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     again = capture(Frame(GpuScene(ctx, shells()), VIEW, *SIZE)).dump
-    monkeypatch.setattr("renderer.capture._BYTES_A_BAND", 8 * 20_000)
-    captured = capture(Frame(GpuScene(ctx, shells()), VIEW, *SIZE))
-    assert captured.bands > 1
-    for other in (again, captured.dump):
-        for field in ("offsets", "rgba", "depth", "background", "facing"):
-            assert np.array_equal(getattr(dump, field), getattr(other, field)), field
+    for module in ("capture", "fragment_list"):
+        monkeypatch.setattr(f"renderer.{module}.CAPACITY", 20_000)
+    split = capture(Frame(GpuScene(ctx, shells()), VIEW, *SIZE))
+    assert split.bands > 1
+    monkeypatch.setattr("renderer.capture._PIXELS", 4000)
+    narrow = capture(Frame(GpuScene(ctx, shells()), VIEW, *SIZE))
+    assert narrow.bands >= SIZE[0] * SIZE[1] // 4000
+    for other in (again, split.dump, narrow.dump):
+        _assert_same(dump, other)
+
+
+def test_a_list_that_was_guessed_too_short_is_made_longer_once(
+    ctx: moderngl.Context, dump: FragmentDump, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("renderer.capture._GUESS", 0)
+    gpu = GpuScene(ctx, shells())
+    first, second = (capture(Frame(gpu, VIEW, *SIZE)) for _ in range(2))
+    assert (first.repeated, second.repeated) == (1, 0)
+    assert dump.total <= gpu.fragment_list.capacity < 16 * dump.total
+    _assert_same(dump, first.dump)
+    _assert_same(dump, second.dump)
+
+
+def test_a_view_whose_fragments_are_all_in_one_tile_is_captured_with_one_cursor(
+    ctx: moderngl.Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    size = (60, 48)
+    expected = capture(Frame(GpuScene(ctx, shells()), VIEW, *size))
+    for module in ("capture", "fragment_list"):
+        monkeypatch.setattr(f"renderer.{module}.CAPACITY", 2 * expected.dump.total)
+    squeezed = capture(Frame(GpuScene(ctx, shells()), VIEW, *size))
+    assert (squeezed.repeated, squeezed.bands) == (1, 1)
+    _assert_same(expected.dump, squeezed.dump)
+
+
+def test_a_row_with_more_than_a_list_holds_is_refused(ctx: moderngl.Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("capture", "fragment_list"):
+        monkeypatch.setattr(f"renderer.{module}.CAPACITY", 100)
+    with pytest.raises(Problem, match="alone has"):
+        capture(Frame(GpuScene(ctx, shells()), VIEW, *SIZE))
+
+
+def test_capture_and_sbuffer_have_the_same_fragments(frame: Frame, dump: FragmentDump) -> None:
+    rendered = SBuffer().render(frame, Budget(1))
+    assert np.array_equal(rendered.k, dump.counts)
+    exact = composite(dump, dump.counts.astype(np.int32), "density", 0.0).reshape(rendered.linear.shape)
+    np.testing.assert_allclose(rendered.linear, exact, atol=1e-6)
+
+
+def test_triangles_outside_the_frustum_are_left_out_and_the_dump_stays_the_same(ctx: moderngl.Context) -> None:
+    near = VIEW.model_copy(update={"eye": (0.0, 0.0, 9.0), "target": (1.5, 0.0, 0.0), "fov": 4.0})
+    gpu = GpuScene(ctx, shells(subdivisions=4))
+    culled = Frame(gpu, near, *SIZE)
+    assert 0 < culled.culled_triangles < len(gpu.scene.indices) // 3
+    gpu.clusters = _Everything(gpu.scene.batches)
+    whole = Frame(gpu, near, *SIZE)
+    assert whole.culled_triangles == 0
+    _assert_same(capture(whole).dump, capture(culled).dump)
+
+
+def test_hidden_fragments_are_those_that_only_the_opaque_depth_removes(ctx: moderngl.Context, frame: Frame) -> None:
+    scene = shells()
+    glass = [batch for batch in scene.batches if batch.layer != "opaque"]
+    without_cube = Frame(GpuScene(ctx, replace(scene, batches=tuple(glass))), VIEW, *SIZE)
+    # The card's own solid texels hide fragments in both frames.
+    card = hidden_fragments(without_cube)
+    cube = int(without_cube.count().sum()) - int(frame.count().sum())
+    assert hidden_fragments(frame) == card + cube
+    assert cube > 100
+    assert card > 100
+
+
+class _Everything:
+    def __init__(self, runs: tuple[Batch, ...]) -> None:
+        self._runs = [[(batch.first // 3, batch.count // 3)] for batch in runs]
+
+    def visible(self, _: np.ndarray) -> tuple[list[Ranges], int]:
+        return self._runs, 0
+
+
+def _assert_same(dump: FragmentDump, other: FragmentDump) -> None:
+    for field in ("offsets", "rgba", "depth", "background", "facing"):
+        assert np.array_equal(getattr(dump, field), getattr(other, field)), field
 
 
 def test_row_bands_cover_every_fragment_once_within_capacity() -> None:

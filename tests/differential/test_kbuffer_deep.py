@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import moderngl
 import numpy as np
 import pytest
-from support.training import random_weights
+from support.training import export_random, random_weights
 
 from labeller.curves import composite
 from renderer.allocation.fill import feasible_k_min, solve_lambda
-from renderer.features import FEATURES, derive, gather
+from renderer.features import FEATURES, derive, gather, texels_of
 from renderer.frame import Frame
 from renderer.techniques import Budget, KBufferDeep
-from schemas.bundle import Provenance, TailSpec
+from renderer.techniques.skips import PREDICTOR, SETTLED_PIXELS, TAIL, UNREAD_SUMS
 from schemas.colour import display8
 from schemas.fragments import FragmentDump
-from trainer.bundle import Description, export_bundle
 from trainer.weights import Weights
 
 
@@ -25,20 +26,17 @@ def network(request: pytest.FixtureRequest) -> Weights:
 
 
 @pytest.fixture(scope="module")
-def deep(
+def bundle(
     network: Weights, dump: FragmentDump, gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory
-) -> KBufferDeep:
+) -> Path:
     folder = tmp_path_factory.mktemp("bundle")
-    description = Description(
-        name="random",
-        tail=TailSpec(name="density", g=0.75),
-        metric="display",
-        k_min=1,
-        provenance=Provenance(scenes={}, code_version="0", seed=0, machine="test"),
-        evaluation={},
-    )
-    export_bundle(folder, network, description, derive(gather(dump))[dump.counts > 0], gl)
-    return KBufferDeep(folder)
+    export_random(folder, network, derive(gather(dump))[dump.counts > 0], gl)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def deep(bundle: Path) -> KBufferDeep:
+    return KBufferDeep(bundle)
 
 
 def test_gain_curves_equal_those_of_the_numpy_network(
@@ -82,3 +80,51 @@ def test_counts_are_those_of_the_cpu(deep: KBufferDeep, network: Weights, frame:
 def test_more_than_all_fragments_needs_no_network(deep: KBufferDeep, frame: Frame, dump: FragmentDump) -> None:
     rendered = deep.render(frame, Budget(2 * dump.total))
     assert np.array_equal(rendered.k, dump.counts)
+    assert rendered.skips[PREDICTOR] == 1
+    assert rendered.skips[TAIL] == 1
+    assert not {"gather", "predict", "lambda"} & set(rendered.passes)
+
+
+def test_onnx_and_glsl_give_the_same_picture(deep: KBufferDeep, bundle: Path, frame: Frame, dump: FragmentDump) -> None:
+    other = KBufferDeep(bundle, "onnx")
+    pixels = np.flatnonzero(dump.counts > 1).astype(np.uint32)
+    np.testing.assert_allclose(other.predict(frame, pixels), deep.predict(frame, pixels), rtol=1e-5, atol=1e-5)
+    budget = Budget(dump.total // 3)
+    one, two = deep.render(frame, budget), other.render(frame, budget)
+    assert (one.k == two.k).mean() > 0.999
+    assert np.abs(display8(one.linear).astype(int) - display8(two.linear).astype(int)).max() <= 2
+
+
+def test_features_are_read_in_blocks_as_at_once(
+    deep: KBufferDeep, frame: Frame, dump: FragmentDump, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pixels = np.flatnonzero(dump.counts > 1).astype(np.uint32)
+    features, gain = deep.features(frame, pixels), deep.predict(frame, pixels)
+    monkeypatch.setattr("renderer.techniques.kbuffer_deep._DISPATCH", 1000)
+    assert len(pixels) > 2000
+    assert np.array_equal(deep.features(frame, pixels), features)
+    assert np.array_equal(deep.predict(frame, pixels), gain)
+
+
+def test_only_what_the_bundle_reads_is_gathered(
+    deep: KBufferDeep, network: Weights, frame: Frame, dump: FragmentDump
+) -> None:
+    rendered = deep.render(frame, Budget(dump.total // 3))
+    full = network.features == FEATURES
+    assert rendered.skips[UNREAD_SUMS] == (0 if full else 2)
+    gathered = frame.gather("gather", texels_of(network.features))
+    assert gathered.pixel_bytes == (5 * 16 + 8 if full else 3 * 16 + 8)
+    assert rendered.skips[SETTLED_PIXELS] == np.count_nonzero(dump.counts == 1)
+
+
+def test_a_bundle_that_reads_no_nearest_fragment_does_not_gather_it(
+    tmp_path: Path, frame: Frame, dump: FragmentDump, gl: moderngl.Context
+) -> None:
+    names = ("log_n", "alpha_mean", "depth_extent")
+    network = random_weights(4, names)
+    export_random(tmp_path, network, derive(gather(dump))[dump.counts > 0], gl)
+    deep = KBufferDeep(tmp_path)
+    assert frame.gather("gather", texels_of(names)).nearest_colour is None
+    pixels = np.flatnonzero(dump.counts > 1).astype(np.uint32)
+    expected = np.stack(network.predict(derive(gather(dump))[pixels]), axis=1)
+    np.testing.assert_allclose(deep.predict(frame, pixels), expected, rtol=1e-3, atol=1e-3)

@@ -11,11 +11,12 @@ import pytest
 from support.training import random_weights, real_features
 
 from renderer.features import FEATURES
+from renderer.onnx_network import OnnxNetwork
 from schemas.bundle import FEATURE_LIMIT, GLSL, ONNX
 from schemas.problem import Problem
 from trainer.export_glsl import glsl_source
 from trainer.export_onnx import OPSET, onnx_model
-from trainer.parity import CHUNK, check, glsl_outputs, onnx_outputs, torch_outputs
+from trainer.parity import CHUNK, check, glsl_outputs, torch_outputs
 from trainer.weights import Weights
 
 
@@ -48,7 +49,7 @@ def test_any_number_of_rows_works(gl: moderngl.Context, tmp_path: Path) -> None:
     for rows in (1, 63, 65, CHUNK + 1):
         inputs = np.random.default_rng(rows).normal(size=(rows, 3)).astype(np.float32)
         truth = torch_outputs(weights, inputs)
-        np.testing.assert_allclose(onnx_outputs(tmp_path / ONNX, inputs), truth, rtol=1e-5, atol=1e-5)
+        np.testing.assert_allclose(OnnxNetwork(tmp_path / ONNX).run(inputs), truth, rtol=1e-5, atol=1e-5)
         np.testing.assert_allclose(glsl_outputs(tmp_path / GLSL, inputs, gl), truth, rtol=1e-5, atol=1e-5)
 
 
@@ -58,7 +59,7 @@ def test_softplus_neither_overflows_nor_vanishes(gl: moderngl.Context, tmp_path:
     weights = Weights(("log_n",), np.zeros(1, np.float32), np.full(1, 1000.0, np.float32), (layer,))
     write(tmp_path, weights)
     inputs = np.array([[-200.0], [-20.0], [0.0], [20.0], [3000.0]], np.float32)
-    for outputs in (onnx_outputs(tmp_path / ONNX, inputs), glsl_outputs(tmp_path / GLSL, inputs, gl)):
+    for outputs in (OnnxNetwork(tmp_path / ONNX).run(inputs), glsl_outputs(tmp_path / GLSL, inputs, gl)):
         np.testing.assert_allclose(outputs[:, 1], [0.02, 0.02, np.log(2.0) + 0.02, 20.02, 3000.02], rtol=1e-5)
 
 
@@ -70,7 +71,7 @@ def test_inputs_beyond_the_training_data_are_clamped_alike(gl: moderngl.Context,
     expected = torch_outputs(weights, edge)
     for outputs in (
         torch_outputs(weights, far),
-        onnx_outputs(tmp_path / ONNX, far),
+        OnnxNetwork(tmp_path / ONNX).run(far),
         glsl_outputs(tmp_path / GLSL, far, gl),
     ):
         np.testing.assert_allclose(outputs, expected, rtol=1e-5, atol=1e-5)
@@ -82,7 +83,7 @@ def test_features_of_hardly_any_spread_keep_parity(gl: moderngl.Context, tmp_pat
     write(tmp_path, narrow)
     inputs = (0.33 + np.random.default_rng(0).normal(0.0, 1e-4, (5000, 3))).astype(np.float32)
     truth = torch_outputs(narrow, inputs)
-    np.testing.assert_allclose(onnx_outputs(tmp_path / ONNX, inputs), truth, rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(OnnxNetwork(tmp_path / ONNX).run(inputs), truth, rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(glsl_outputs(tmp_path / GLSL, inputs, gl), truth, rtol=1e-5, atol=1e-5)
 
 

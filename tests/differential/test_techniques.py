@@ -23,7 +23,7 @@ def simulate(dump: FragmentDump, k: np.ndarray, tail: TailName, g: float = 0.75)
 @pytest.mark.parametrize("tail", TAILS)
 def test_any_allocation_looks_as_simulated__tail(frame: Frame, dump: FragmentDump, tail: TailName) -> None:
     k = np.random.default_rng(3).integers(0, 12, dump.pixels).astype(np.int32)
-    rendered = KBufferOptimal(np.minimum(k, dump.counts).astype(np.int32)).render(frame, Budget(0, tail))
+    rendered = KBufferOptimal(lambda *_: np.minimum(k, dump.counts).astype(np.int32)).render(frame, Budget(0, tail))
     np.testing.assert_allclose(rendered.linear, simulate(dump, rendered.k, tail), atol=3e-6, rtol=0)
 
 
@@ -65,7 +65,7 @@ def test_a_picture_is_identical_from_run_to_run(gl: moderngl.Context, frame: Fra
 
 
 def test_every_pass_and_byte_is_reported(frame: Frame, dump: FragmentDump) -> None:
-    rendered = KBufferImportance().render(frame, Budget(dump.total // 4))
+    rendered = KBufferImportance().render(frame, Budget(dump.total // 4, chain="two-pass"))
     assert {
         "opaque",
         "count",

@@ -20,6 +20,7 @@ PACKAGES = ("schemas", "renderer", "labeller", "trainer", "services")
 DOCUMENTS = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "deploy/README.md", "docs/SERVICE.md")
 
 DISTRIBUTIONS = {
+    "OpenEXR": "openexr",
     "PIL": "pillow",
     "pxr": "usd-core",
     "flip_evaluator": "flip-evaluator",

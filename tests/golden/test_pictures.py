@@ -13,17 +13,19 @@ import numpy as np
 import pytest
 from PIL import Image
 from support.scenes import VIEW, shells
+from support.training import export_random, random_weights
 
+from renderer.capture import capture
 from renderer.context import describe
+from renderer.features import derive, gather
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
-from renderer.techniques import Budget, KBuffer, KBufferImportance, SBuffer, Technique
+from renderer.techniques import TECHNIQUES, Budget, Needs, technique
 from schemas.colour import display8
 
 FOLDER = Path(__file__).parent
 DRIVER = FOLDER / "driver.json"
 SIZE = (240, 160)
-TECHNIQUES: list[Technique] = [SBuffer(), KBuffer(), KBufferImportance()]
 
 
 @pytest.fixture(scope="module")
@@ -31,12 +33,21 @@ def frame(gl: moderngl.Context) -> Frame:
     return Frame(GpuScene(gl, shells(subdivisions=3)), VIEW, *SIZE)
 
 
-@pytest.mark.parametrize("technique", TECHNIQUES, ids=lambda technique: technique.name)
+@pytest.fixture(scope="module")
+def needs(frame: Frame, gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Needs:
+    """A network of random weights, and an allocation that depends on nothing but the counts."""
+    folder = tmp_path_factory.mktemp("bundle")
+    dump = capture(frame).dump
+    export_random(folder, random_weights(11), derive(gather(dump))[dump.counts > 0], gl)
+    return Needs(bundle=folder, allocate=lambda frame, _: (frame.count() // 2).astype(np.int32))
+
+
+@pytest.mark.parametrize("name", TECHNIQUES)
 def test_picture_is_the_golden_one(
-    technique: Technique, frame: Frame, gl: moderngl.Context, request: pytest.FixtureRequest, tmp_path: Path
+    name: str, needs: Needs, frame: Frame, gl: moderngl.Context, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
-    picture = display8(technique.render(frame, Budget(2 * frame.pixels)).linear)
-    golden_file = FOLDER / f"{technique.name}.png"
+    picture = display8(technique(name, needs).render(frame, Budget(2 * frame.pixels)).linear)
+    golden_file = FOLDER / f"{name}.png"
     if request.config.getoption("--golden"):
         Image.fromarray(picture).save(golden_file, optimize=True)
         DRIVER.write_text(json.dumps({"driver": describe(gl)}) + "\n", encoding="utf-8")

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from pathlib import Path
 
+import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from labeller.allocate import allocate
 from labeller.curves import error_curves
 from labeller.hull import lower_hulls
 from renderer.features import FEATURES, derive, gather
+from schemas.bundle import Provenance, TailSpec
 from support.dumps import random_dump
+from trainer.bundle import Description, export_bundle
 from trainer.dataset import ViewData, make_view
 from trainer.weights import Layer, Weights
 
@@ -54,6 +59,19 @@ def random_weights(seed: int, features: tuple[str, ...] = FEATURES, hidden: tupl
     mean = rng.normal(0.0, 0.5, len(features)).astype(np.float32)
     std = rng.uniform(0.05, 1.0, len(features)).astype(np.float32)
     return Weights(features, mean, std, tuple(layers))
+
+
+def export_random(folder: Path, network: Weights, features: NDArray[np.float32], gl: moderngl.Context) -> None:
+    """A bundle of a network in a folder, its three forms compared on these features."""
+    description = Description(
+        name="random",
+        tail=TailSpec(name="density", g=0.75),
+        metric="display",
+        k_min=1,
+        provenance=Provenance(scenes={}, code_version="0", seed=0, machine="test"),
+        evaluation={},
+    )
+    export_bundle(folder, network, description, features, gl)
 
 
 def real_features(rows: int, seed: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:

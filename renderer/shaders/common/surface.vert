@@ -5,6 +5,10 @@ layout(location = 0) in vec3 in_position;
 layout(location = 1) in vec3 in_normal;
 layout(location = 2) in vec2 in_uv;
 layout(location = 3) in vec4 in_colour;
+#if MORE_UVS
+layout(location = 4) in vec4 in_more_uvs;
+out vec4 v_more_uvs;
+#endif
 
 uniform mat4 world_to_view;
 uniform mat4 projection;
@@ -12,7 +16,6 @@ uniform mat4 projection;
 invariant gl_Position;
 invariant out float v_depth;
 out vec3 v_normal;
-out vec3 v_view;
 out vec2 v_uv;
 out vec4 v_colour;
 
@@ -20,8 +23,10 @@ void main() {
     precise vec4 view = world_to_view * vec4(in_position, 1.0);
     v_depth = -view.z;  // view-space distance along the axis, metres
     v_normal = mat3(world_to_view) * in_normal;
-    v_view = -view.xyz;
     v_uv = in_uv;
+#if MORE_UVS
+    v_more_uvs = in_more_uvs;
+#endif
     v_colour = in_colour;
     gl_Position = projection * view;
 }

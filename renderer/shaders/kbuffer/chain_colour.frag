@@ -1,17 +1,22 @@
 #version 450
 // Second pass of the chain: every fragment finds its slot by its depth, or goes to the tail.
 // Fragments of equal depth share a run of slots; a chain over the packed colour orders them as the sorted dump does.
+// TAIL -1: every fragment has a slot.
 layout(early_fragment_tests) in;
 #include "common/surface.glsl"
+#if TAIL >= 0
 #include "kbuffer/tail.glsl"
+#endif
 
 layout(std430, binding = 0) readonly buffer Offsets { uint offset[]; };  // [P+1]
 layout(std430, binding = 1) readonly buffer Depths { uint depth[]; };
 layout(std430, binding = 2) coherent buffer Colours { uint colour[]; };
 uniform int width;
 
+#if TAIL >= 0
 layout(location = 0) out vec4 tail_colour;   // sum w C, sum w
 layout(location = 1) out vec4 tail_opacity;  // sum -ln(1-a), sum a, count
+#endif
 
 const uint EMPTY = 0xFFFFFFFFu;
 
@@ -37,5 +42,7 @@ void main() {
         if (before == EMPTY) discard;  // it found a free slot: nothing is left for the tail
         word = max(word, before);
     }
+#if TAIL >= 0
     accumulate_tail(p, unpack(word), v_depth, tail_colour, tail_opacity);
+#endif
 }

@@ -1,6 +1,8 @@
 #version 450
 // Core front to back, then the tail, then the background (METHOD 2). Linear RGB out.
-// TAIL: -1 none (the pool holds every fragment), else as in tail.glsl.
+// TAIL: -1 none (the pool holds every fragment), else as in tail.glsl. STRIDE: words of a slot; the first is the colour.
+#include "common/composite.glsl"
+
 layout(std430, binding = 0) readonly buffer Offsets { uint offset[]; };  // [P+1]
 layout(std430, binding = 2) readonly buffer Colours { uint colour[]; };
 layout(binding = 0) uniform sampler2D background;
@@ -9,22 +11,17 @@ layout(binding = 1) uniform sampler2D tail_colour;
 layout(binding = 2) uniform sampler2D tail_opacity;
 #endif
 uniform int width;
+uniform int first_row;  // of the pool
 layout(location = 0) out vec4 out_colour;
-
-const uint EMPTY = 0xFFFFFFFFu;
 
 void main() {
     ivec2 xy = ivec2(gl_FragCoord.xy);
-    int p = xy.y * width + xy.x;
-    vec3 rgb = vec3(0.0);
-    float transmittance = 1.0;
+    int p = (xy.y - first_row) * width + xy.x;
+    vec4 light = vec4(0.0, 0.0, 0.0, 1.0);
     for (uint i = offset[p], end = offset[p + 1]; i < end; ++i) {
-        uint word = colour[i];
+        uint word = colour[STRIDE * i];
         if (word == EMPTY) break;  // the pixel has fewer fragments than slots
-        vec3 root = vec3(word & 255u, word >> 8 & 255u, word >> 16 & 255u) / 255.0;
-        float a = float(word >> 24) / 255.0;
-        rgb += transmittance * a * root * root;
-        transmittance *= 1.0 - a;
+        add_behind(word, light);
     }
     vec3 behind = texelFetch(background, xy, 0).rgb;
     behind *= behind;
@@ -45,5 +42,5 @@ void main() {
 #endif
     }
 #endif
-    out_colour = vec4(rgb + transmittance * behind, 1.0);
+    out_colour = vec4(light.rgb + light.a * behind, 1.0);
 }

@@ -9,7 +9,7 @@ from support.dumps import random_dump
 
 from labeller.allocate import allocate
 from labeller.allocation import RULES, RuleName
-from labeller.baselines import dynamic, fixed
+from labeller.baselines import fixed
 from labeller.curves import error_curves
 from labeller.hull import lower_hulls
 
@@ -100,13 +100,8 @@ def test_a_negative_budget_is_refused() -> None:
         allocate(dump, error_curves(dump), [-1], "greedy")
 
 
-def test_fixed_counts_every_pixel_and_dynamic_only_what_is_there() -> None:
-    n = np.array([0, 0, 1, 2, 5, 9])
-    assert fixed(n, 12).tolist() == [0, 0, 1, 2, 2, 2]
-    assert dynamic(n, 10).tolist() == [0, 0, 1, 2, 3, 3]
-    assert dynamic(n, 9).tolist() == [0, 0, 1, 2, 3, 3]
-    assert dynamic(n, 8).tolist() == [0, 0, 1, 2, 2, 2]
-    assert dynamic(n, 17).tolist() == n.tolist()
+def test_fixed_counts_every_pixel() -> None:
+    assert fixed(np.array([0, 0, 1, 2, 5, 9]), 12).tolist() == [0, 0, 1, 2, 2, 2]
 
 
 def test_hulls_have_their_lower_points_and_no_flat_end() -> None:

@@ -50,8 +50,9 @@ def test_points_that_are_not_finite_name_the_prim(tmp_path: Path, number: str) -
         load_scene(file)
 
 
-def test_a_transform_that_is_not_finite_is_a_problem(tmp_path: Path) -> None:
-    move = 'double3 xformOp:translate = (nan, 0, 0)\nuniform token[] xformOpOrder = ["xformOp:translate"]'
+@pytest.mark.parametrize("op", ["double3 xformOp:translate = (nan, 0, 0)", "float3 xformOp:scale = (inf, 1, 1)"])
+def test_a_transform_that_is_not_finite_is_a_problem(tmp_path: Path, op: str) -> None:
+    move = f'{op}\nuniform token[] xformOpOrder = ["{op.split()[1]}"]'
     with pytest.raises(Problem, match="not finite"):
         load_scene(stage(tmp_path, triangle(extra=move)))
 
@@ -186,11 +187,11 @@ def test_native_instances_share_geometry_but_not_inherited_colours(tmp_path: Pat
 
 def test_unsupported_and_missing_things_are_warnings_with_the_prims_path(tmp_path: Path) -> None:
     body = triangle() + (
-        'def BasisCurves "Hair" { int[] curveVertexCounts = [2]\npoint3f[] points = [(0,0,0),(1,0,0)] }\n'
+        'def NurbsCurves "Hair" { int[] curveVertexCounts = [2]\npoint3f[] points = [(0,0,0),(1,0,0)] }\n'
         'def Xform "Gone" ( references = @./absent.usda@ ) {}\n'
     )
     warnings = "\n".join(load_scene(stage(tmp_path, body)).warnings)
-    assert "BasisCurves prims are not drawn: /Hair" in warnings
+    assert "NurbsCurves prims are not drawn: /Hair" in warnings
     assert "absent.usda" in warnings
     assert "/Gone" in warnings
     assert "0x" not in warnings, "addresses would make two runs differ"

@@ -140,11 +140,11 @@ def test_a_texture_gives_colour_and_opacity_and_coordinates_are_transformed(tmp_
 
 def test_cut_outs_keep_their_shape_with_and_without_alpha(tmp_path: Path) -> None:
     inputs = OPACITY + "\nfloat inputs:opacityThreshold = 0.5"
-    for alpha, stored, layer in ((None, 255, "opaque"), (0.2, 51, "mixed")):
+    for alpha, left, layer in ((None, 1.0, "opaque"), (0.2, 0.2, "mixed")):
         scene = load(tmp_path, inputs, TEXTURE % (image(tmp_path), ""), alpha=alpha)
-        assert scene.batches[0].opacity_threshold == 0.5
-        assert scene.batches[0].layer == layer
-        assert set(scene.colours[:, 3]) == {stored}
+        (batch,) = scene.batches
+        assert (batch.opacity_threshold, batch.cut_out_alpha, batch.layer) == (0.5, left, layer)
+        assert set(scene.colours[:, 3]) == {255}
 
 
 @pytest.mark.parametrize(("opacity", "kept"), [(0.6, 4), (0.4, 0)])
@@ -229,11 +229,11 @@ def test_one_batch_for_each_set_of_textures_and_layer(tmp_path: Path) -> None:
 
 def test_images_are_rgba_upside_down_and_not_larger_than_the_limit(tmp_path: Path) -> None:
     Image.new("L", (2 * MAX_SIDE, 4), 7).save(tmp_path / "wide.png")
-    pixels, is_colour = decode_image((tmp_path / "wide.png").read_bytes())
-    assert pixels.shape == (2, MAX_SIDE, 4)
-    assert not is_colour
+    wide = decode_image((tmp_path / "wide.png").read_bytes())
+    assert wide.pixels.shape == (2, MAX_SIDE, 4)
+    assert not wide.srgb
     Image.fromarray(np.array([[0, 65535]], dtype=np.uint16)).save(tmp_path / "deep.png")
-    np.testing.assert_array_equal(decode_image((tmp_path / "deep.png").read_bytes())[0][0, :, 0], [0, 255])
+    np.testing.assert_array_equal(decode_image((tmp_path / "deep.png").read_bytes()).pixels[0, :, 0], [0, 255])
     with pytest.raises(TextureUnreadable):
         decode_image(b"\x89PNG\r\n\x1a\n")
 

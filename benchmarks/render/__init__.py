@@ -1,0 +1,1 @@
+"""Measurements of the renderer: capture, techniques, reuse of an uploaded scene."""

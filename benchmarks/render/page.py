@@ -1,0 +1,134 @@
+"""The figures of the renderer as a page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from renderer.techniques import TECHNIQUES
+
+
+def page(found: Mapping[str, Any]) -> str:
+    """Markdown of what `benchmarks.renderer` measured."""
+    before, after = (found["load_average"][when][0] for when in ("before", "after"))
+    parts = [
+        "# The renderer, measured\n",
+        f"{found['driver']}. {found['created']}; load average {before:.1f} before and {after:.1f} after. "
+        "1430x960, milliseconds on the wall clock, medians of rounds in which everything takes its turn.\n",
+        f"```\n{found['command']}\n```\n",
+    ]
+    sections = {"capture": _capture, "views": _views, "learned": _learned, "techniques": _techniques}
+    parts += [write(found[name]) for name, write in sections.items() if found.get(name)]
+    return "\n".join(parts)
+
+
+def _capture(rows: list[dict[str, Any]]) -> str:
+    table = _table(
+        ("scene", "triangles", "fragments", "empty pass", "capture", "ratio", "least ratio", "M fragments/s", "passes"),
+        (
+            (
+                r["scene"],
+                f"{r['triangles']:,}",
+                f"{r['fragments']:,}",
+                _ms(r["times"]["empty"]["median"]),
+                _ms(r["times"]["capture"]["median"]),
+                f"{r['ratio']['median']:.2f}",
+                f"{r['ratio']['least']:.2f}",
+                f"{r['fragments_per_s']['median'] / 1e6:.1f}",
+                _passes({name: ms for name, ms in r["passes"].items() if name != "opaque"}),
+            )
+            for r in rows
+        ),
+    )
+    bounds = "\n".join(
+        f"- {r['scene']}: {r['bytes_moved'] / 2**20:.0f} MiB are written or read, "
+        f"{1e3 * r['bytes_moved'] / r['copy_bytes_per_s']:.0f} ms at this machine's copy speed of "
+        f"{r['copy_bytes_per_s'] / 1e9:.1f} GB/s; {r['hidden']:,} fragments were behind opaque surfaces, "
+        f"{r['culled']:,} triangles outside the frustum."
+        for r in rows
+    )
+    return (
+        "## Capture\n\nThe whole capture (append pass, readback, counting sort, sort) against rasterising the same "
+        f"triangles once with an empty fragment shader; `least` compares the best of each.\n\n{table}\n{bounds}\n"
+    )
+
+
+def _views(rows: list[dict[str, Any]]) -> str:
+    table = _table(
+        ("scene", "load", "upload", "second view", "its capture alone", "with a new upload"),
+        (
+            (
+                r["scene"],
+                _ms(r["load_ms"]),
+                _ms(r["upload_ms"]),
+                *(_ms(r["times"][name]["median"]) for name in ("second view", "capture alone", "upload and view")),
+            )
+            for r in rows
+        ),
+    )
+    return (
+        "## Many views of one scene\n\nThe second view of a scene that is on the GPU draws its opaque surfaces and "
+        f"captures; nothing is read or uploaded again.\n\n{table}"
+    )
+
+
+def _learned(rows: list[dict[str, Any]]) -> str:
+    table = _table(
+        ("scene", "network in", "frame", "kbuffer-importance", "difference", "ratio", "passes"),
+        (
+            (
+                r["scene"],
+                name.removeprefix("deep, "),
+                _ms(r["times"][name]["median"]),
+                _ms(r["times"]["importance"]["median"]),
+                _ms(extra),
+                f"{r['ratio'][name]:.2f}",
+                _passes(r["passes"][name]),
+            )
+            for r in rows
+            for name, extra in r["extra_ms"].items()
+        ),
+    )
+    return (
+        "## The price of learning\n\n`kbuffer-deep` minus `kbuffer-importance` at F = 2 W H: features, inference and "
+        f"lambda against one importance map.\n\n{table}"
+    )
+
+
+def _techniques(rows: list[dict[str, Any]]) -> str:
+    order = list(TECHNIQUES)
+    table = _table(
+        ("scene", "technique", "ms", "pool MiB", "B/pixel", "total MiB", "MSE x1e-5", "FLIP", "passes"),
+        (
+            (
+                r["scene"],
+                r["technique"],
+                _ms(r["total_ms"]),
+                f"{r['pool_bytes'] / 2**20:.1f}",
+                str(r["pixel_bytes"]),
+                f"{r['total_bytes'] / 2**20:.1f}",
+                f"{1e5 * r['mse']:.3g}",
+                f"{r['flip']:.4f}",
+                _passes(r["passes"]),
+            )
+            for r in sorted(rows, key=lambda r: (r["scene"] != "thicket", order.index(r["technique"])))
+        ),
+    )
+    return (
+        "## Every technique\n\nBounded ones at F = 2 W H with the density tail. Against the exact picture, 8-bit "
+        "sRGB. On a software driver every pass over triangles costs processor time; on a GPU the order is another."
+        f"\n\n{table}"
+    )
+
+
+def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    lines = [head, tuple("---" for _ in head), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def _passes(passes: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {ms:.0f}" for name, ms in passes.items())
+
+
+def _ms(value: float) -> str:
+    return f"{value:.0f}"

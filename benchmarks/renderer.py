@@ -1,0 +1,77 @@
+"""The renderer, measured: capture against bare rasterising, the price of learning, reuse of a scene, every technique.
+
+python -m benchmarks.renderer --bundle FOLDER --out benchmarks/results/renderer.json --page benchmarks/RENDERER.md
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from contextlib import nullcontext
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from benchmarks.render import measure
+from benchmarks.render.bundle import random_bundle
+from benchmarks.render.page import page
+from benchmarks.render.setup import subjects
+from renderer.context import describe, gl_context
+from renderer.techniques import TECHNIQUES
+from services.versions import library_versions, machine
+
+PARTS = ("capture", "views", "learned", "techniques")
+
+
+def main() -> int:
+    """Measures what was asked for, writes the figures and the page."""
+    arguments = _parse()
+    ctx = gl_context()
+    found: dict[str, Any] = {
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "command": "python -m benchmarks.renderer " + " ".join(sys.argv[1:]),
+        "driver": describe(ctx),
+        "machine": machine(),
+        "versions": library_versions(),
+        "load_average": {"before": os.getloadavg()},
+        "bundle": "random weights" if arguments.bundle is None else "given",
+        **{part: [] for part in arguments.parts},
+    }
+    trained: Path | None = arguments.bundle
+    with nullcontext(trained) if trained is not None else random_bundle(ctx) as bundle:
+        for subject in subjects(ctx, tuple(arguments.scenes)):
+            print(f"{subject.name}: {', '.join(arguments.parts)}", file=sys.stderr, flush=True)
+            if "capture" in arguments.parts:
+                found["capture"].append(measure.capture_cost(subject, arguments.rounds))
+            if "views" in arguments.parts:
+                found["views"].append(measure.second_view(subject, arguments.rounds))
+            if "learned" in arguments.parts:
+                found["learned"].append(measure.learned_cost(subject, bundle, arguments.rounds))
+            if "techniques" in arguments.parts:
+                found["techniques"] += measure.every_technique(subject, trained, 2, arguments.techniques)
+    found["load_average"]["after"] = os.getloadavg()
+    text = page(found)
+    print(text)
+    if arguments.out is not None:
+        arguments.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    if arguments.page is not None:
+        arguments.page.write_text(text, encoding="utf-8")
+    return 0
+
+
+def _parse() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS))
+    parser.add_argument("--scenes", nargs="+", choices=("thicket", "sponza"), default=["thicket", "sponza"])
+    parser.add_argument("--techniques", nargs="+", choices=list(TECHNIQUES), default=list(TECHNIQUES))
+    parser.add_argument("--rounds", type=int, default=9, help="Rounds of what is measured in turns.")
+    parser.add_argument("--bundle", type=Path, help="Folder of a trained bundle; without it, random weights.")
+    parser.add_argument("--out", type=Path, help="Where the figures go, JSON.")
+    parser.add_argument("--page", type=Path, help="Where the page goes, Markdown.")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

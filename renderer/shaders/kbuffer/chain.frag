@@ -1,0 +1,42 @@
+#version 450
+// The chain in one pass, with 64-bit atomics: keys are depth, then packed colour, the order of the sorted dump.
+// Each slot keeps the minimum of what passes it and hands the larger key on; what falls out of the last one goes to the
+// tail at once. TAIL -1: every fragment has a slot.
+#extension GL_ARB_gpu_shader_int64 : require
+#extension GL_NV_shader_atomic_int64 : require
+layout(early_fragment_tests) in;
+#include "common/surface.glsl"
+#if TAIL >= 0
+#include "kbuffer/tail.glsl"
+#endif
+
+layout(std430, binding = 0) readonly buffer Offsets { uint offset[]; };  // [P+1]
+layout(std430, binding = 2) coherent buffer Slots { uint64_t slot[]; };
+uniform int width;
+
+#if TAIL >= 0
+layout(location = 0) out vec4 tail_colour;   // sum w C, sum w
+layout(location = 1) out vec4 tail_opacity;  // sum -ln(1-a), sum a, count
+#endif
+
+void main() {
+    uvec4 stored = stored_surface();
+#if MIXED
+    if (!is_transparent(stored)) discard;
+#endif
+    const uint64_t empty = packUint2x32(uvec2(0xFFFFFFFFu));
+    int p = int(gl_FragCoord.y) * width + int(gl_FragCoord.x);
+    uint end = offset[p + 1];
+    uint64_t key = packUint2x32(uvec2(pack(stored), floatBitsToUint(v_depth)));
+    for (uint i = offset[p]; i < end; ++i) {
+        // A slot only ever falls, so a key read here that is not above ours stays so: the atomic would change nothing.
+        if (slot[i] <= key) continue;
+        uint64_t before = atomicMin(slot[i], key);
+        if (before == empty) discard;  // it found a free slot: nothing is left for the tail
+        key = max(key, before);
+    }
+#if TAIL >= 0
+    uvec2 fallen = unpackUint2x32(key);
+    accumulate_tail(p, unpack(fallen.x), uintBitsToFloat(fallen.y), tail_colour, tail_opacity);
+#endif
+}

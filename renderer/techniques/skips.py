@@ -1,0 +1,26 @@
+"""Names of what a technique leaves out because the picture is exactly the same without it (METHOD.md section 5)."""
+
+from __future__ import annotations
+
+from renderer.frame import Frame
+from renderer.screen import empty_tiles
+
+EMPTY_TILES = "empty tiles"
+"""Tiles of the window without a transparent fragment: no pass over pixels visits them."""
+PREDICTOR = "predictor runs"
+"""The budget holds every fragment: nothing is gathered, predicted or solved."""
+TAIL = "tails"
+"""Every fragment has a slot: no tail is gathered or blended."""
+SETTLED_PIXELS = "pixels settled without the predictor"
+"""Pixels of one fragment, and others that k_min covers."""
+UNREAD_SUMS = "sums that the bundle does not read"
+"""Columns of the gather pass that no feature of the bundle needs."""
+CULLED_TRIANGLES = "triangles outside the frustum"
+"""Triangles whose cluster lies outside of what the camera sees: no pass draws them."""
+HIDDEN_FRAGMENTS = "fragments behind opaque surfaces"
+"""Fragments that the depth test ended before they were shaded (`renderer.hidden`; a pass of its own counts them)."""
+
+
+def frame_skips(frame: Frame) -> dict[str, int]:
+    """What every technique leaves out of a frame: empty tiles, triangles outside the frustum."""
+    return {EMPTY_TILES: empty_tiles(frame), CULLED_TRIANGLES: frame.culled_triangles}

@@ -1,0 +1,62 @@
+"""What the techniques that blend all fragments into sums share: float targets, the mean they resolve to, accounts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import moderngl
+import numpy as np
+
+from renderer.frame import Clock, Frame
+from renderer.screen import read_linear, resolve_screen
+from renderer.techniques.base import Rendered
+from renderer.techniques.skips import frame_skips
+
+
+def float_targets(frame: Frame, *components: int) -> list[moderngl.Texture]:
+    """Float32 textures of the frame's size, zero, one for each number of components."""
+    made = [frame.ctx.texture((frame.width, frame.height), count, dtype="f4") for count in components]
+    for texture in made:
+        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+        frame.ctx.framebuffer([texture]).clear(0.0, 0.0, 0.0, 0.0)
+    return made
+
+
+def resolve_mean(frame: Frame, colours: moderngl.Texture, depths: moderngl.Texture) -> moderngl.Texture:
+    """`(1 - T) sum w C / sum w + T C_bg` with `T = exp(-optical depth)`; RGBA32F, linear.
+
+    Args:
+        frame: The view.
+        colours: RGBA32F, `sum w C` and `sum w`.
+        depths: R32F, `sum -ln(1-a)`.
+    """
+    return resolve_screen(frame, "common/weighted_mean.frag", [frame.background, colours, depths])
+
+
+def rendered(
+    frame: Frame,
+    image: moderngl.Texture,
+    shared: Mapping[str, float],
+    clock: Clock,
+    pixel_bytes: int,
+    pool_bytes: int = 0,
+) -> Rendered:
+    """The finished picture of a technique that keeps no fragment apart.
+
+    Args:
+        frame: The view.
+        image: RGBA32F, linear.
+        shared: Milliseconds of the shared passes that were used.
+        clock: Its own passes.
+        pixel_bytes: As `Rendered` has it.
+        pool_bytes: As `Rendered` has it.
+    """
+    return Rendered(
+        linear=read_linear(frame, image),
+        k=np.zeros(frame.pixels, dtype=np.int32),
+        passes={**shared, **clock.passes},
+        captured=0,
+        pool_bytes=pool_bytes,
+        pixel_bytes=pixel_bytes,
+        skips=frame_skips(frame),
+    )

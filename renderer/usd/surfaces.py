@@ -1,0 +1,165 @@
+"""Surface shaders, of UsdPreviewSurface and of MaterialX, as what alpha blending can show: colour, emission, opacity.
+
+Alpha blending has no refraction: a surface that transmits light becomes a tint of low opacity. `opacityMode` does not
+matter, since a highlight is blended with the rest ("presence").
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from pxr import UsdShade
+
+from renderer.usd.drivers import ONES, ZEROS, Driver, Vec4, constant, number, number_of, product
+from renderer.usd.networks import Network, category_of
+
+OPACITY_OF_GLASS = 0.25
+"""What alpha blending shows of a surface that transmits all light: its tint, not its refraction."""
+
+
+NOTHING, SOLID = constant(ZEROS), constant(ONES)
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """What a material says about colour and opacity.
+
+    Attributes:
+        colour: Linear RGB.
+        emission: Linear RGB that is added.
+        opacity: In [0,1].
+        threshold: `opacityThreshold`; above 0 the surface is a cut-out.
+    """
+
+    colour: Driver
+    emission: Driver = NOTHING
+    opacity: Driver = SOLID
+    threshold: float = 0.0
+
+
+def preview_surface(network: Network, shader: UsdShade.Shader) -> Surface:
+    """UsdPreviewSurface, as a USD shader or as a MaterialX node."""
+    return Surface(
+        colour=network.drive(shader.GetInput("diffuseColor"), (0.18, 0.18, 0.18, 1.0)),
+        emission=network.drive(shader.GetInput("emissiveColor"), ZEROS),
+        opacity=network.drive(shader.GetInput("opacity"), ONES),
+        threshold=network.number(shader, "opacityThreshold", 0.0),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Inputs:
+    """Names of the inputs of a MaterialX surface; "" where it has no such input.
+
+    Attributes:
+        weight: Factor on the colour.
+        colour: Base colour, `grey` by default.
+        grey: That default.
+        opacity: Opacity.
+        transmission: How much light goes through instead of being reflected.
+        tint: The colour of that light.
+        glow: Factor on the emission.
+        dark: The default of that factor.
+        emission: Emitted colour.
+        lit: The default of that colour.
+    """
+
+    weight: str
+    colour: str
+    grey: float
+    opacity: str
+    transmission: str
+    tint: str
+    glow: str
+    dark: float
+    emission: str
+    lit: float
+
+
+_MATERIALX = {
+    "standard_surface": _Inputs(
+        *("base", "base_color", 0.8, "opacity"),
+        *("transmission", "transmission_color"),
+        *("emission", 0.0, "emission_color", 1.0),
+    ),
+    # Its emission is in nits, which say nothing without an exposure.
+    "open_pbr_surface": _Inputs(
+        *("base_weight", "base_color", 0.8, "geometry_opacity"),
+        *("transmission_weight", "transmission_color"),
+        *("", 0.0, "", 0.0),
+    ),
+    "gltf_pbr": _Inputs(
+        *("", "base_color", 1.0, "alpha"),
+        *("transmission", "attenuation_color"),
+        *("emissive_strength", 1.0, "emissive", 0.0),
+    ),
+}
+
+
+def materialx_surface(network: Network, shader: UsdShade.Shader) -> Surface:
+    """standard_surface, open_pbr_surface and gltf_pbr (MaterialX specification 1.39, Physically Based Shading)."""
+    names = _MATERIALX[category_of(shader)]
+    transmission = network.drive(shader.GetInput(names.transmission), ZEROS)
+    if transmission.is_constant and transmission.number_bias > 0.5:
+        colour = network.drive(shader.GetInput(names.tint), ONES)
+    else:
+        colour = network.drive(shader.GetInput(names.colour), _grey(names.grey))
+        colour = _weighted(network, shader, names.weight, 1.0, colour)
+    emission = NOTHING
+    if names.emission:
+        emission = network.drive(shader.GetInput(names.emission), _grey(names.lit))
+        emission = _weighted(network, shader, names.glow, names.dark, emission)
+    elif network.number(shader, "emission_luminance", 0.0) > 0.0:
+        network.log.add("emission in nits is left out", shader.GetPath())
+    opacity = network.drive(shader.GetInput(names.opacity), ONES)
+    surface = Surface(colour, emission, _through(network, shader, opacity, transmission))
+    return _gltf_alpha(network, shader, surface) if names.opacity == "alpha" else surface
+
+
+def _weighted(network: Network, shader: UsdShade.Shader, name: str, default: float, colour: Driver) -> Driver:
+    """A colour times the number of that input; where both vary, the colour alone, with a warning."""
+    weight = network.drive(shader.GetInput(name), _grey(default)) if name else SOLID
+    found = product(colour, _repeated(weight))
+    if found is None:
+        network.log.add(f"{name} varies and so does its colour, it is left out", shader.GetPath())
+    return colour if found is None else found
+
+
+def _repeated(driver: Driver) -> Driver:
+    """A number that multiplies all channels alike."""
+    return number(driver.number_bias) if driver.is_constant else driver.only(driver.number_channel)
+
+
+def _through(network: Network, shader: UsdShade.Shader, opacity: Driver, transmission: Driver) -> Driver:
+    """Opacity where light goes through: opacity * (1 - (1 - OPACITY_OF_GLASS) * transmission)."""
+    less = -(1.0 - OPACITY_OF_GLASS)
+    if transmission.is_constant:
+        factor = 1.0 + less * min(max(transmission.number_bias, 0.0), 1.0)
+        return opacity.times(_grey(factor))
+    found = product(_repeated(opacity), _repeated(transmission).times(_grey(less)).plus(ONES))
+    if found is None:
+        network.log.add("transmission varies and so does opacity, it is left out", shader.GetPath())
+    return opacity if found is None else found
+
+
+def _gltf_alpha(network: Network, shader: UsdShade.Shader, surface: Surface) -> Surface:
+    """`alpha_mode` of gltf_pbr: 0 ignores alpha, 1 cuts out at `alpha_cutoff`, 2 blends."""
+    mode = number_of(network.value(shader.GetInput("alpha_mode")), 0.0)
+    if mode == 1.0:
+        return replace(surface, threshold=network.number(shader, "alpha_cutoff", 0.5))
+    if mode == 2.0:
+        return surface
+    transmission = network.drive(shader.GetInput("transmission"), ZEROS)
+    return replace(surface, opacity=_through(network, shader, SOLID, transmission))
+
+
+def _grey(value: float) -> Vec4:
+    return value, value, value, value
+
+
+SURFACES: dict[str, Callable[[Network, UsdShade.Shader], Surface]] = {
+    "UsdPreviewSurface": preview_surface,
+    **dict.fromkeys(_MATERIALX, materialx_surface),
+}
+"""Readers by category of the surface shader."""

@@ -1,0 +1,207 @@
+"""What a user can ask `diaphane render` for, checked before any work starts."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+
+from renderer.allocation.importance import VkbOptions
+from renderer.scene import LoadOptions
+from renderer.techniques import TECHNIQUES, Needs
+from renderer.techniques.kbuffer_deep import Inference
+from renderer.timecodes import check_pattern, parse_frames
+from schemas.colour import srgb_to_linear
+from schemas.limits import LIMITS
+from schemas.problem import ExitCode, Problem
+from schemas.tail import DENSITY_G, TailName
+
+RGB = tuple[float, float, float]
+
+COMPLEXITIES = {"low": 0, "medium": 1, "high": 2, "veryhigh": 3}
+"""Levels of refinement by usdrecord's words."""
+SUFFIXES = (".png", ".exr")
+EVERY = "all"
+DEFAULT_TECHNIQUE = "sbuffer"
+
+_FACTORS = ("depth", "periphery", "fresnel", "noise")
+
+
+@dataclass(frozen=True, slots=True)
+class RenderOptions:
+    """What to render, from where, how, and where to.
+
+    Attributes:
+        scenes: Files.
+        techniques: Names; see `parse_techniques`.
+        needs: What some techniques need; the bundle is found by `bundle`.
+        budget: F as a multiple of width * height.
+        tail: How fragments beyond the core are approximated.
+        g: Steepness of the density tail.
+        bundle: Folder of a bundle, or a name in the registry, for `kbuffer-deep`.
+        camera: Name or path of a camera.
+        views: A views file.
+        image_width: Pixels per row; rows follow from the camera.
+        size: Width and height instead.
+        frames: Time codes; empty: the start of the stage. Not a number: the default time.
+        load: How scenes are read; the time is that of the frame.
+        background: Linear RGB where nothing opaque is.
+        output: Path with a suffix of SUFFIXES, and # where a frame's number goes; None: named after the scene.
+        is_full: Whether EXR channels are 32-bit instead of half floats.
+        compare: Whether each picture is compared with the exact one.
+        state: Folder of the registry.
+
+    Raises:
+        Problem: Something of it cannot be.
+    """
+
+    scenes: tuple[Path, ...]
+    techniques: tuple[str, ...] = (DEFAULT_TECHNIQUE,)
+    needs: Needs = field(default_factory=Needs)
+    budget: float = 2.0
+    tail: TailName = "density"
+    g: float = DENSITY_G
+    bundle: str | None = None
+    camera: str | None = None
+    views: Path | None = None
+    image_width: int = 960
+    size: tuple[int, int] | None = None
+    frames: tuple[float, ...] = ()
+    load: LoadOptions = field(default_factory=LoadOptions)
+    background: RGB = (1.0, 1.0, 1.0)
+    output: Path | None = None
+    is_full: bool = False
+    compare: bool = False
+    state: Path = Path(".diaphane")
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.budget) and 0.0 < self.budget <= LIMITS.budget):
+            raise Problem(
+                f"A budget of {self.budget:g} cannot be used.",
+                f"Give a multiple of width x height, above 0 and at most {LIMITS.budget:g}: --budget 2.",
+            )
+        if not (math.isfinite(self.g) and 0.0 <= self.g <= 10.0):
+            raise Problem(f"--g {self.g} is not between 0 and 10.", "Change that option.")
+        for side in (self.image_width, *(self.size or ())):
+            if not 1 <= side <= LIMITS.max_side:
+                raise Problem(f"{side} pixels are no side of a picture.", f"Give 1 to {LIMITS.max_side} pixels.")
+        if self.output is not None:
+            if self.output.suffix.lower() not in SUFFIXES:
+                raise Problem(f"{self.output} is no name of a picture.", "End it in .png or .exr.")
+            check_pattern(self.output, self.frames)
+
+
+def parse_techniques(names: Sequence[str], has_bundle: bool) -> tuple[str, ...]:
+    """Names of techniques, also with commas between.
+
+    Args:
+        names: As given; `all` means every one that there is, `kbuffer-deep` only with a bundle. None: the exact one.
+        has_bundle: Whether a bundle is given.
+
+    Raises:
+        Problem: There is none of that name.
+    """
+    listed = [part.strip() for name in names for part in name.split(",") if part.strip()]
+    found: list[str] = []
+    for name in listed or [DEFAULT_TECHNIQUE]:
+        if name == EVERY:
+            found += [each for each in TECHNIQUES if each != "kbuffer-deep" or has_bundle]
+        elif name in TECHNIQUES:
+            found.append(name)
+        else:
+            raise Problem(
+                f"There is no technique '{name}'.",
+                f"Choose among: {', '.join((*TECHNIQUES, EVERY))}.",
+                ExitCode.NOT_FOUND,
+            )
+    return tuple(dict.fromkeys(found))
+
+
+def parse_times(frames: str | None, default_time: bool) -> tuple[float, ...]:
+    """Time codes of `--frames`, or not a number for `--defaultTime`; empty for neither.
+
+    Raises:
+        Problem: Both are given, or the frames are none.
+    """
+    if frames is not None and default_time:
+        raise Problem("Both --frames and --defaultTime say when.", "Leave one of them out.")
+    if default_time:
+        return (math.nan,)
+    return () if frames is None else parse_frames(frames)
+
+
+def parse_refine(complexity: str | None, refine: int | None) -> int:
+    """Levels of refinement, by usdrecord's word or by number.
+
+    Raises:
+        Problem: Both are given, or there is no such word.
+    """
+    if complexity is not None and refine is not None:
+        raise Problem("Both --complexity and --refine say how far to refine.", "Leave one of them out.")
+    if complexity is not None and complexity not in COMPLEXITIES:
+        raise Problem(f"There is no complexity '{complexity}'.", f"Use one of {', '.join(COMPLEXITIES)}.")
+    return COMPLEXITIES[complexity] if complexity is not None else refine or 0
+
+
+def parse_background(text: str) -> RGB:
+    """Linear RGB of `#rrggbb` (as a screen shows it), or of three linear numbers with commas between.
+
+    Raises:
+        Problem: It is neither.
+    """
+    if match := re.fullmatch(r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})", text):
+        red, green, blue = srgb_to_linear(np.array([int(part, 16) / 255.0 for part in match.groups()])).tolist()
+        return red, green, blue
+    try:
+        red, green, blue = (float(part) for part in text.split(","))
+    except ValueError:
+        red = green = blue = math.nan
+    if not all(0.0 <= value <= 1.0 for value in (red, green, blue)):
+        raise Problem(f"'{text}' is no colour.", "Write it like '#ffffff', or as linear red,green,blue: 0.5,0.5,0.5.")
+    return red, green, blue
+
+
+def parse_vkb(text: str) -> VkbOptions:
+    """Factors of `kbuffer-importance`.
+
+    Args:
+        text: `thesis` for the thesis's variant; `no-depth`, `no-periphery`, `no-fresnel` and `no-noise` switch factors
+            off; several with commas between. Empty: the paper's.
+
+    Raises:
+        Problem: Something else is in it.
+    """
+    words = [word.strip() for word in text.split(",") if word.strip()]
+    options = VkbOptions.thesis() if "thesis" in words else VkbOptions()
+    for word in words:
+        factor = word.removeprefix("no-")
+        if word != "thesis" and (factor == word or factor not in _FACTORS):
+            raise Problem(f"--vkb '{word}' is no switch.", f"Use thesis, {', '.join(f'no-{f}' for f in _FACTORS)}.")
+        if factor == "noise":
+            options = replace(options, noise=0.0)
+        elif word != "thesis":
+            options = replace(options, **{factor: False})
+    return options
+
+
+def parse_needs(vkb: str, inference: str, nodes: int | None, samples: int | None) -> Needs:
+    """What some techniques need, but for bundle and allocation.
+
+    Args:
+        vkb: See `parse_vkb`.
+        inference: How `kbuffer-deep` runs its network.
+        nodes: Nodes a pixel of `multilayer` and `adaptive`.
+        samples: Samples a pixel of `stochastic`.
+
+    Raises:
+        Problem: There is no such inference or VKB factor.
+    """
+    for known in get_args(Inference):
+        if inference == known:
+            return Needs(vkb=parse_vkb(vkb), inference=known, nodes=nodes, samples=samples)
+    raise Problem(f"There is no inference '{inference}'.", f"Use one of {', '.join(get_args(Inference))}.")

@@ -1,0 +1,136 @@
+"""Thousands of fragments in one pixel, at the ends of what alpha and depth can be: every technique stays finite, the
+exact ones stay exact, and the ones with a budget stay what the float64 simulation of the same allocation gives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import moderngl
+import numpy as np
+import pytest
+from support.stacks import STRIDE, VIEW, extreme_stacks, size, stack_scene
+from support.training import random_weights
+
+from labeller.curves import composite
+from renderer.capture import capture
+from renderer.features import FEATURES, derive, gather
+from renderer.frame import Frame
+from renderer.gpu_scene import GpuScene
+from renderer.reference import adaptive, multilayer
+from renderer.techniques import TECHNIQUES, Adaptive, Budget, Multilayer, Needs, Rendered, technique
+from renderer.techniques.ordered import capture_ordered
+from schemas.bundle import Provenance, TailSpec
+from schemas.fragments import FragmentDump
+from schemas.tail import TAILS, TailName
+from trainer.bundle import Description, export_bundle
+
+LAYERS = 4096
+FEWER_LAYERS = 96
+PASSES_GROW_WITH_LAYERS = ("depth-peeling", "dual-depth-peeling")
+BOUND = 1e-5
+"""Linear. 1 - 1/255 is rounded once and multiplied hundreds of times before the product is small: 4e-6 is usual."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A frame of stacks, its fragments and the exact picture."""
+
+    frame: Frame
+    dump: FragmentDump
+
+    def picture(self, k: np.ndarray, tail: TailName = "density") -> np.ndarray:
+        return composite(self.dump, k, tail).reshape(self.dump.height, self.dump.width, 3)
+
+
+def make_case(gl: moderngl.Context, layers: int) -> Case:
+    stacks = extreme_stacks(layers)
+    frame = Frame(GpuScene(gl, stack_scene(stacks)), VIEW, *size(len(stacks)))
+    return Case(frame, capture(frame).dump)
+
+
+@pytest.fixture(scope="module")
+def case(gl: moderngl.Context) -> Case:
+    return make_case(gl, LAYERS)
+
+
+@pytest.fixture(scope="module")
+def lower_case(gl: moderngl.Context) -> Case:
+    return make_case(gl, FEWER_LAYERS)
+
+
+@pytest.fixture(scope="module")
+def needs(case: Case, gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Needs:
+    return Needs(
+        bundle=make_bundle(case.dump, gl, tmp_path_factory.mktemp("bundle")),
+        allocate=lambda frame, _: np.minimum(frame.count(), 5 + np.arange(frame.pixels) % 60).astype(np.int32),
+    )
+
+
+def make_bundle(dump: FragmentDump, gl: moderngl.Context, folder: Path) -> Path:
+    description = Description(
+        name="random",
+        tail=TailSpec(name="density", g=0.75),
+        metric="display",
+        k_min=1,
+        provenance=Provenance(scenes={}, code_version="0", seed=0, machine="test"),
+        evaluation={},
+    )
+    export_bundle(folder, random_weights(11, FEATURES, (8,)), description, derive(gather(dump))[dump.counts > 0], gl)
+    return folder
+
+
+def family(name: str) -> list[str]:
+    return [each for each, entry in TECHNIQUES.items() if entry.family == name]
+
+
+def render(case: Case, name: str, needs: Needs, tail: TailName = "density") -> Rendered:
+    rendered = technique(name, needs).render(case.frame, Budget(case.dump.total // 64, tail))
+    assert np.isfinite(rendered.linear).all()
+    assert rendered.linear.min() >= 0.0
+    return rendered
+
+
+def test_every_layer_is_captured_in_order(case: Case) -> None:
+    counts = case.dump.counts
+    assert set(np.unique(counts)) == {0, LAYERS}
+    assert (counts > 0).sum() == 4 * len(extreme_stacks(1))
+    depth = case.dump.depth.reshape(-1, LAYERS)
+    assert (np.diff(depth, axis=1) >= 0.0).all()
+    assert case.dump.depth.max() > 4000.0 * case.dump.depth.min()
+
+
+@pytest.mark.parametrize("name", family("exact"))
+def test_exact_techniques_stay_exact__name(case: Case, lower_case: Case, needs: Needs, name: str) -> None:
+    used = lower_case if name in PASSES_GROW_WITH_LAYERS else case
+    rendered = render(used, name, needs)
+    np.testing.assert_allclose(rendered.linear, used.picture(used.dump.counts), atol=BOUND, rtol=0)
+
+
+@pytest.mark.parametrize("tail", TAILS)
+@pytest.mark.parametrize("name", family("bounded"))
+def test_bounded_techniques_are_as_simulated__name_tail(case: Case, needs: Needs, name: str, tail: TailName) -> None:
+    rendered = render(case, name, needs, tail)
+    assert 0 < rendered.captured < case.dump.total
+    np.testing.assert_allclose(rendered.linear, case.picture(rendered.k, tail), atol=BOUND, rtol=0)
+
+
+@pytest.mark.parametrize("name", family("approximate"))
+def test_approximate_techniques_make_no_light__name(case: Case, needs: Needs, name: str) -> None:
+    # No surface and no background is brighter than 1.
+    assert render(case, name, needs).linear.max() <= 1.0 + BOUND
+
+
+@pytest.mark.parametrize("nodes", [8, 16])
+@pytest.mark.parametrize("name", [Multilayer.name, Adaptive.name])
+def test_ordered_techniques_equal_their_twins__name_nodes(case: Case, name: str, nodes: int) -> None:
+    # The most nodes: a loop over them that is not unrolled would end too early here (`renderer.screen.TURNS`).
+    twin = {Multilayer.name: multilayer, Adaptive.name: adaptive}[name]
+    found = capture_ordered(case.frame)
+    linear = render(case, name, Needs(nodes=nodes)).linear.reshape(-1, 3)
+    for stack in range(len(extreme_stacks(1))):
+        pixel = STRIDE * stack + STRIDE // 2 + (STRIDE // 2) * case.frame.width
+        run = slice(found.offsets[pixel], found.offsets[pixel + 1])
+        background = case.dump.background[pixel : pixel + 1]
+        expected = twin.picture(np.array([0, LAYERS]), found.packed[run], found.depth[run], background, nodes)
+        np.testing.assert_allclose(linear[pixel], expected[0], atol=BOUND, rtol=0)

@@ -1,0 +1,157 @@
+"""The capture in order of submission, and `multilayer` and `adaptive` against their float64 twins on it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import ModuleType
+
+import moderngl
+import numpy as np
+import pytest
+from support.scenes import SIZE, VIEW, shells
+
+from renderer.frame import Frame
+from renderer.gpu_scene import GpuScene
+from renderer.reference import adaptive, multilayer
+from renderer.techniques import Adaptive, Budget, Multilayer, SBuffer, Technique, bands, ordered
+from renderer.techniques.ordered import Ordered, capture_ordered
+from renderer.techniques.sbuffer import capture_band, row_bands
+from schemas.fragments import FragmentDump
+from schemas.limits import LIMITS
+from schemas.problem import ExitCode, Problem
+from schemas.view import View
+
+INSIDE = View(name="inside", eye=(0.3, 0.2, 1.0), target=(0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), fov=80.0)
+"""Among the shells: many triangles are clipped, others left out."""
+
+
+@pytest.fixture(scope="module")
+def fragments(frame: Frame) -> Ordered:
+    return capture_ordered(frame)
+
+
+def pixels_of(offsets: np.ndarray) -> np.ndarray:
+    return np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+
+
+def picture(twin: ModuleType, fragments: Ordered, dump: FragmentDump, nodes: int) -> np.ndarray:
+    made = twin.picture(fragments.offsets, fragments.packed, fragments.depth, dump.background, nodes)
+    return made.reshape(dump.height, dump.width, 3)
+
+
+def test_same_fragments_as_the_dump(fragments: Ordered, dump: FragmentDump) -> None:
+    assert np.array_equal(fragments.offsets, dump.offsets)
+    order = np.lexsort((fragments.packed, fragments.depth, pixels_of(dump.offsets)))
+    assert np.array_equal(fragments.packed[order], dump.rgba.view("<u4").ravel())
+    assert np.array_equal(fragments.depth[order], dump.depth)
+
+
+@pytest.mark.parametrize("view", [VIEW, INSIDE], ids=lambda view: view.name)
+def test_rank_names_the_triangle_and_rises_inside_every_pixel(gl: moderngl.Context, view: View) -> None:
+    scene = shells()
+    frame = Frame(GpuScene(gl, scene), view, *SIZE)
+    found = capture_ordered(frame)
+    pixel = pixels_of(found.offsets)
+    rank = found.rank.astype(np.int64)
+    assert ((np.diff(rank) > 0) | (np.diff(pixel) > 0)).all()
+    # The ray of a pixel meets the plane of the triangle at the fragment's depth.
+    to_view = view.world_to_view()
+    corners = scene.positions[scene.indices.reshape(-1, 3)[rank]] @ to_view[:3, :3].T + to_view[:3, 3]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    half = np.tan(np.radians(view.fov) / 2.0)
+    x = ((pixel % frame.width + 0.5) / frame.width * 2.0 - 1.0) * half * frame.width / frame.height
+    y = (1.0 - (pixel // frame.width + 0.5) / frame.height * 2.0) * half
+    ray = np.stack([x, y, -np.ones_like(x)], axis=1)
+    depth = (normal * corners[:, 0]).sum(axis=1) / (normal * ray).sum(axis=1)
+    np.testing.assert_allclose(found.depth, depth, rtol=1e-4)
+
+
+def test_order_of_arrival_in_the_pool_does_not_matter(
+    frame: Frame, fragments: Ordered, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # A software driver happens to run fragments in order of submission; others do not.
+    def shuffled(
+        frame: Frame, fragment: str, offsets: np.ndarray, band: object, into: np.ndarray, ranked: bool
+    ) -> None:
+        capture_band(frame, fragment, offsets, band, into, ranked)  # type: ignore[arg-type]
+        into[:] = into[np.lexsort((np.random.default_rng(2).random(len(into)), pixels_of(offsets)))]
+
+    monkeypatch.setattr(ordered, "capture_band", shuffled)
+    again = capture_ordered(frame)
+    for field in ("packed", "depth", "rank"):
+        assert np.array_equal(getattr(again, field), getattr(fragments, field)), field
+
+
+@pytest.mark.parametrize("technique", [Multilayer(), Adaptive()], ids=lambda technique: technique.name)
+def test_bands_of_rows_give_the_same_picture__technique(
+    frame: Frame, fragments: Ordered, monkeypatch: pytest.MonkeyPatch, technique: Technique
+) -> None:
+    whole = technique.render(frame, Budget(0))
+    limits = replace(LIMITS, buffer_bytes=60_000)
+    for module in (ordered, bands):
+        monkeypatch.setattr(module, "LIMITS", limits)
+    split: list[tuple[int, int]] = []
+    monkeypatch.setattr(bands, "row_bands", lambda *args: split.extend(row_bands(*args)) or split)
+    assert np.array_equal(technique.render(frame, Budget(0)).linear, whole.linear)
+    assert len(split) > 2
+
+
+@pytest.mark.parametrize("nodes", [1, 2, 4, 8])
+def test_multilayer_equals_its_twin__nodes(frame: Frame, dump: FragmentDump, fragments: Ordered, nodes: int) -> None:
+    rendered = Multilayer(nodes).render(frame, Budget(0))
+    np.testing.assert_allclose(rendered.linear, picture(multilayer, fragments, dump, nodes), atol=1e-6, rtol=0)
+    assert np.array_equal(rendered.k, np.minimum(dump.counts, nodes))
+
+
+@pytest.mark.parametrize("nodes", [2, 4, 8, 16])
+def test_adaptive_equals_its_twin__nodes(frame: Frame, dump: FragmentDump, fragments: Ordered, nodes: int) -> None:
+    # 1e-6 in every pixel: both sides remove the same nodes.
+    rendered = Adaptive(nodes).render(frame, Budget(0))
+    np.testing.assert_allclose(rendered.linear, picture(adaptive, fragments, dump, nodes), atol=1e-6, rtol=0)
+    assert np.array_equal(rendered.k, np.minimum(dump.counts, nodes))
+
+
+@pytest.mark.parametrize("technique", [Multilayer(16), Adaptive(16)], ids=lambda technique: technique.name)
+def test_a_node_for_every_fragment_is_exact__technique(frame: Frame, dump: FragmentDump, technique: Technique) -> None:
+    exact = SBuffer().render(frame, Budget(0)).linear
+    enough = (dump.counts <= 16).reshape(exact.shape[:2])
+    assert (~enough).any()
+    np.testing.assert_allclose(technique.render(frame, Budget(0)).linear[enough], exact[enough], atol=1e-6, rtol=0)
+
+
+def test_four_layers_are_nearer_to_exact_than_two(frame: Frame) -> None:
+    exact = SBuffer().render(frame, Budget(0)).linear
+    two, four = (np.abs(Multilayer(nodes).render(frame, Budget(0)).linear - exact).mean() for nodes in (2, 4))
+    assert four < 0.5 * two
+
+
+@pytest.mark.parametrize("technique", [Multilayer(), Adaptive()], ids=lambda technique: technique.name)
+def test_a_picture_is_identical_from_frame_to_frame__technique(
+    gl: moderngl.Context, frame: Frame, technique: Technique
+) -> None:
+    again = Frame(GpuScene(gl, shells()), VIEW, *SIZE)
+    assert np.array_equal(technique.render(frame, Budget(0)).linear, technique.render(again, Budget(0)).linear)
+
+
+@pytest.mark.parametrize("technique", [Multilayer(), Adaptive()], ids=lambda technique: technique.name)
+def test_passes_bytes_and_skips_are_reported__technique(frame: Frame, dump: FragmentDump, technique: Technique) -> None:
+    rendered = technique.render(frame, Budget(0))
+    assert list(rendered.passes) == ["opaque", "count", "capture", "sort", "upload", "resolve"]
+    assert rendered.pool_bytes == 12 * dump.total
+    assert rendered.total_bytes == 12 * dump.total + 16 * frame.pixels
+    assert rendered.skips["empty tiles"] > 0
+
+
+@pytest.mark.parametrize(
+    "technique", [Multilayer(0), Multilayer(17), Adaptive(1)], ids=["no layer", "17 layers", "one node"]
+)
+def test_nodes_out_of_range_are_a_problem__technique(frame: Frame, technique: Technique) -> None:
+    with pytest.raises(Problem, match="nodes a pixel"):
+        technique.render(frame, Budget(0))
+
+
+def test_a_run_too_long_for_the_shaders_is_a_problem(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bands, "MOST_FRAGMENTS", 10)
+    with pytest.raises(Problem, match="transparent fragments") as caught:
+        Adaptive().render(frame, Budget(0))
+    assert caught.value.code is ExitCode.LIMIT

@@ -1,0 +1,50 @@
+"""Every technique again on zink over lavapipe, which has the 64-bit atomics of the one-pass chain and needs no GPU.
+
+A process has one context, so they run in another one.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from support.drivers import LLVMPIPE, PACKAGES, ROOT, ZINK, environment, facts, lavapipe_installed
+
+ONE_PASS = "tests/differential/test_chain_one_pass.py"
+TECHNIQUES = sorted(
+    path.relative_to(ROOT).as_posix()
+    for path in (ROOT / "tests" / "differential").glob("test_*.py")
+    if "from renderer.techniques" in path.read_text(encoding="utf-8")
+)
+
+pytestmark = pytest.mark.skipif(
+    not lavapipe_installed(), reason=f"there is no Vulkan driver for zink: apt-get install {PACKAGES}"
+)
+
+
+@pytest.fixture(scope="module")
+def runtime(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("runtime")
+    folder.chmod(0o700)
+    return folder
+
+
+def test_fragments_are_bit_identical_on_both_software_drivers(runtime: Path) -> None:
+    zink, llvmpipe = facts(ZINK, runtime), facts(LLVMPIPE, runtime)
+    assert zink["driver"].startswith("zink")
+    assert zink["one_pass"]
+    assert llvmpipe["driver"].startswith("llvmpipe")
+    assert not llvmpipe["one_pass"]
+    assert zink["fragments"] > 10_000
+    assert zink["sha256"] == llvmpipe["sha256"]
+
+
+def test_the_differential_tests_of_all_techniques_pass_on_zink(runtime: Path, tmp_path: Path) -> None:
+    assert ONE_PASS in TECHNIQUES
+    command = [sys.executable, "-m", "pytest", *TECHNIQUES, "-p", "no:cacheprovider", f"--basetemp={tmp_path / 'run'}"]
+    done = subprocess.run(command, env=environment(ZINK, runtime), cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-8000:] + done.stderr[-2000:]
+    skipped = [line for line in done.stdout.splitlines() if line.startswith("SKIPPED") and ONE_PASS in line]
+    assert not skipped, "the one-pass chain was not tested"
