@@ -16,14 +16,17 @@ import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdUtils, Vt
+from trimesh.resolvers import FilePathResolver
 
 from renderer.authoring import COORDINATES, Geometry, Look, vectors, write_material, write_mesh
 from renderer.convert_looks import Looks, is_invented
+from renderer.usd.assemble import FARTHEST
 from schemas.colour import srgb_to_linear
 from schemas.problem import ExitCode, Problem
 
@@ -34,6 +37,7 @@ _TARGETS = (".usd", ".usda", ".usdc", ".usdz")
 _READING: dict[str, dict[str, bool]] = {".obj": {"split_objects": True, "group_material": True}}
 """What trimesh shall do, by suffix: here, keep the names of objects."""
 _UP = {".ply": "Z", ".stl": "Z"}
+_COMPRESSIONS = {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +75,7 @@ def convert_meshes(source: Path, target: Path, up: str | None = None, metres_per
         metres_per_unit: Metres per unit of the source; glTF's is always a metre.
 
     Raises:
-        Problem: The source cannot be read or has no triangles, or the target is of another kind.
+        Problem: The source cannot be read or has no triangles, or the target is of another kind or cannot be written.
     """
     _check(source, target, up, metres_per_unit)
     is_gltf = source.suffix.lower() in _GLTF
@@ -79,13 +83,20 @@ def convert_meshes(source: Path, target: Path, up: str | None = None, metres_per
         raise Problem("glTF is Y-up, and its unit is the metre.", "Leave --up and --metersPerUnit out.")
     scene = _read(source)
     up = up or _UP.get(source.suffix.lower(), "Y")
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix="convert-", dir=target.parent) as folder:
-        # A usdz package is made of a stage on disk.
-        stage_path = Path(folder) / (target.stem + (".usdc" if target.suffix.lower() == ".usdz" else target.suffix))
-        writer = _Writer(scene, source, f"{target.stem}_textures", stage_path.parent)
-        converted = writer.write(stage_path, up, metres_per_unit)
-        _publish(stage_path, Path(folder) / writer.textures, target)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix="convert-", dir=target.parent) as folder:
+            # A usdz package is made of a stage on disk.
+            stage_path = Path(folder) / (target.stem + (".usdc" if target.suffix.lower() == ".usdz" else target.suffix))
+            writer = _Writer(scene, source, f"{target.stem}_textures", stage_path.parent)
+            converted = writer.write(stage_path, up, metres_per_unit)
+            _publish(stage_path, Path(folder) / writer.textures, target)
+    except (OSError, Tf.ErrorException) as error:
+        # USD does not say why.
+        reason = f": {error.strerror}" if isinstance(error, OSError) and error.strerror else ""
+        raise Problem(
+            f"{target} cannot be written{reason}.", "Make room, or name another place.", ExitCode.TRY_AGAIN
+        ) from error
     return converted
 
 
@@ -107,10 +118,15 @@ def _read(source: Path) -> trimesh.Scene:
     try:
         # Unprocessed: trimesh would merge points, and so make facets smooth and move texture seams.
         wanted: dict[str, Any] = {"process": False, **_READING.get(source.suffix.lower(), {})}
-        scene: trimesh.Scene = trimesh.load_scene(source, **wanted)
+        # Textures of an OBJ are often beside its folder; glTF comes as one folder.
+        resolver = FilePathResolver(str(source), allow_anywhere=source.suffix.lower() not in _GLTF)
+        scene: trimesh.Scene = trimesh.load_scene(source, resolver=resolver, **wanted)
+        needed = _gltf_json(source).get("extensionsRequired", []) if source.suffix.lower() in _GLTF else []
     except Exception as error:  # every reader has its own kinds
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise Problem(f"{source} cannot be read ({reason[:200]}).", "Export it again.") from error
+    for extension in _COMPRESSIONS.intersection(needed):
+        raise Problem(f"{source} is compressed with {extension}.", "Export it without compression.")
     return scene
 
 
@@ -187,8 +203,10 @@ class _Writer:
                 self._warn("points and lines are left out")
             elif len(mesh.faces) == 0:
                 self._warn("meshes without triangles are left out")
-            elif not (np.isfinite(mesh.vertices).all() and np.isfinite(matrix).all()):
-                raise Problem(f"{self.source} has coordinates that are not finite.", "Export it again.")
+            elif not (np.all(np.abs(mesh.vertices) <= FARTHEST) and np.isfinite(matrix).all()):
+                raise Problem(f"{self.source} has coordinates that are not finite, or huge.", "Export it again.")
+            elif mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
+                raise Problem(f"{self.source} has triangles of points that do not exist.", "Export it again.")
             else:
                 places.setdefault(name, []).append((str(node), np.asarray(matrix, dtype=np.float64)))
         if not places:
@@ -269,11 +287,18 @@ class _Writer:
     def _name_what_is_left_out(self) -> None:
         if self.source.suffix.lower() == ".obj":
             for name in re.findall(rb"^mtllib\s+(.+?)\s*$", self.source.read_bytes(), re.MULTILINE):
-                if not (self.source.parent / name.decode(errors="replace")).is_file():
+                library = self.source.parent / name.decode(errors="replace")
+                if not library.is_file():
                     self._warn(f"the materials {name.decode(errors='replace')} are missing")
+                for image in _missing_images(library) if library.is_file() else ():
+                    self._warn(f"the image {image} is missing, and left out")
         if self.source.suffix.lower() not in _GLTF:
             return
         document = _gltf_json(self.source)
+        for image in document.get("images", []):
+            uri = str(image.get("uri", "data:"))
+            if not uri.startswith("data:") and not _is_beneath(self.source.parent, unquote(uri)):
+                self._warn(f"the image {uri} is missing, or outside of the file's folder")
         if document.get("animations"):
             self._warn("animations are left out: the scene is as at rest")
         if document.get("skins"):
@@ -285,6 +310,20 @@ class _Writer:
             self._warn(f"{extension} is left out")
         if any(set(sampler) & {"wrapS", "wrapT"} for sampler in document.get("samplers", [])):
             self._warn("textures repeat, whatever their samplers say")
+
+
+def _is_beneath(folder: Path, name: str) -> bool:
+    """Whether a name leads to a file in a folder or further down."""
+    file = (folder / name).resolve()
+    return file.is_file() and file.is_relative_to(folder.resolve())
+
+
+def _missing_images(library: Path) -> list[str]:
+    """Colour images that a material library names and that do not exist."""
+    names = re.findall(rb"^\s*map_Kd\s+(.+?)\s*$", library.read_bytes(), re.MULTILINE | re.IGNORECASE)
+    # Before the name there may be options.
+    found = [name.decode(errors="replace").replace("\\", "/") for name in names]
+    return [name for name in found if not any((library.parent / n).is_file() for n in (name, name.split()[-1]))]
 
 
 def _gltf_json(source: Path) -> dict[str, Any]:

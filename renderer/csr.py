@@ -63,8 +63,7 @@ def bin_fragments(
         ties by colour; facing uint8 [P], the greatest of the fragments at the nearest depth, 0 where there is none.
     """
     counts = _histograms(places, pixels, min(numba.get_num_threads(), _PARTS))
-    offsets = offsets_of(counts.sum(axis=0, dtype=np.int64))
-    _cursors(offsets, counts)
+    offsets = _cursors(counts)
     run_keys, run_facing = new_scratch(len(keys)) if scratch is None else scratch
     _scatter(keys, places, counts, run_keys, run_facing)
     colour, depth = np.empty(len(keys), dtype=np.uint32), np.empty(len(keys), dtype=np.uint32)
@@ -97,15 +96,20 @@ def _histograms(places: NDArray[np.uint32], pixels: int, parts: int) -> NDArray[
     return counts
 
 
-@njit(parallel=True, cache=True, nogil=True)
-def _cursors(offsets: NDArray[np.int64], counts: NDArray[np.uint32]) -> None:
-    # Counts become where each part writes its first fragment of a pixel.
-    for p in prange(len(offsets) - 1):
-        cursor = offsets[p]
-        for part in range(len(counts)):
+@njit(cache=True, nogil=True)
+def _cursors(counts: NDArray[np.uint32]) -> NDArray[np.int64]:
+    # Offsets; counts become where each part writes its first fragment of a pixel. One pass, bound by memory.
+    parts, pixels = counts.shape
+    offsets = np.empty(pixels + 1, dtype=np.int64)
+    cursor = 0
+    for p in range(pixels):
+        offsets[p] = cursor
+        for part in range(parts):
             count = counts[part, p]
             counts[part, p] = cursor
             cursor += count
+    offsets[pixels] = cursor
+    return offsets
 
 
 @njit(parallel=True, cache=True, nogil=True)

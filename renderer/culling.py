@@ -6,8 +6,6 @@ write neighbouring triangles one after the other.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
@@ -17,7 +15,10 @@ from schemas.scene import Batch, SceneArrays
 CLUSTER = 1024
 """Triangles of a cluster."""
 _MARGIN = 1e-4
-"""By what share of w a bound may be outside and still be drawn: float32 transforms and sub-pixel snapping."""
+"""By what share of w a bound may be outside and still be drawn: sub-pixel snapping."""
+_ROUNDING = 2.0**-20
+"""By what share of the terms that a clip coordinate is the sum of: two products of four terms in float32.
+It matters where positions are large for what is seen: the eye's distance from the origin cancels."""
 
 Ranges = list[tuple[int, int]]
 """First triangle and number of triangles of runs."""
@@ -40,16 +41,17 @@ class Clusters:
         self._bounds = np.empty((len(self._first), 2, 3))
         _measure(scene.positions, scene.indices, self._first, self._end, self._bounds)
 
-    def visible(self, clip: NDArray[np.float64]) -> tuple[list[Ranges], int]:
+    def visible(self, projection: NDArray[np.float64], to_view: NDArray[np.float64]) -> tuple[list[Ranges], int]:
         """What a camera may see of every batch.
 
         Args:
-            clip: float64 [4, 4], world to clip space (column vectors), z in [-w, w].
+            projection: float64 [4, 4], view to clip space (column vectors), z in [-w, w].
+            to_view: float64 [4, 4], world to view space.
 
         Returns:
             For every batch its visible runs, and how many triangles are in none.
         """
-        seen = ~_outside(self._bounds, clip)
+        seen = ~_outside(self._bounds, projection, to_view)
         ranges: list[Ranges] = [[] for _ in range(self._count)]
         left_out = 0
         for batch, first, end, is_seen in zip(self._batches, self._first, self._end, seen, strict=True):
@@ -67,13 +69,25 @@ def _starts(batch: Batch) -> NDArray[np.int64]:
     return np.arange(batch.first // 3, (batch.first + batch.count) // 3, CLUSTER, dtype=np.int64)
 
 
-def _outside(bounds: NDArray[np.float64], clip: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Bool [C]: all eight corners are beyond the same clip plane."""
+def _outside(
+    bounds: NDArray[np.float64], projection: NDArray[np.float64], to_view: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Bool [C]: all eight corners are beyond the same clip plane, by more than a shader's float32 may be wrong."""
     corners = np.stack([bounds[:, (i, j, k), (0, 1, 2)] for i in (0, 1) for j in (0, 1) for k in (0, 1)], axis=1)
-    x, y, z, w = np.moveaxis(corners @ clip[:, :3].T + clip[:, 3], -1, 0)
-    slack = _MARGIN * np.abs(w)
-    planes: Sequence[NDArray[np.float64]] = (w + x, w - x, w + y, w - y, w + z, w - z)
-    return np.asarray(np.any([(plane < -slack).all(axis=1) for plane in planes], axis=0))
+    x, y, z, w = _transformed(corners, projection @ to_view)
+    # The same sums without signs, which is what roundings are relative to.
+    size_x, size_y, size_z, size_w = _transformed(np.abs(corners), np.abs(projection) @ np.abs(to_view))
+    outside = np.zeros(len(bounds), dtype=bool)
+    for coordinate, size in ((x, size_x), (y, size_y), (z, size_z)):
+        slack = _MARGIN * np.abs(w) + _ROUNDING * (size + size_w)
+        for side in (w + coordinate, w - coordinate):
+            outside |= (side < -slack).all(axis=1)
+    return outside
+
+
+def _transformed(points: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """[4, ...]: homogeneous coordinates of points [..., 3]."""
+    return np.moveaxis(points @ matrix[:, :3].T + matrix[:, 3], -1, 0)
 
 
 @njit(parallel=True, cache=True, nogil=True)

@@ -216,7 +216,8 @@ def _opened(path: Path) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         with OpenEXR.File(str(path), separate_channels=True) as file:
             header, found = dict(file.header()), file.channels()  # closing empties the header
             channels = {name: channel.pixels for name, channel in found.items()}
-    except RuntimeError as error:
+    except (RuntimeError, ValueError, IndexError) as error:
+        # Of a damaged file the library makes one without parts.
         raise Problem(f"{path} is no OpenEXR file that can be read.", "Export it again.") from error
     if not {"R", "G", "B", "A", "Z"} <= channels.keys() or channels["Z"].dtype != object:
         raise Problem(f"{path} has no deep samples with R, G, B, A and Z.", "Export these channels, as deep data.")

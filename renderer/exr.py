@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -9,7 +11,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
-from renderer.exr_header import REC709, Attribute
+from renderer.exr_header import REC709, ZIP_LINES, Attribute, is_complete
 from schemas.problem import Problem
 from schemas.scene import SceneArrays
 from schemas.view import View
@@ -28,6 +30,9 @@ def write_exr(
         linear: [H, W, 3] linear RGB, row 0 at the top.
         attributes: Further attributes of the header.
         full: 32-bit channels; else half floats, whose steps are below an 8-bit one of sRGB.
+
+    Raises:
+        OSError: The file is not complete.
     """
     header = {
         **(attributes or {}),
@@ -36,8 +41,14 @@ def write_exr(
         "chromaticities": REC709,
     }
     pixels = np.ascontiguousarray(linear, dtype=np.float32 if full else np.float16)
-    with OpenEXR.File(header, {"RGB": pixels}) as file:
-        file.write(str(path))
+    try:
+        with OpenEXR.File(header, {"RGB": pixels}) as file:
+            file.write(str(path))
+    except RuntimeError as error:
+        raise OSError(errno.EIO, str(error), str(path)) from error
+    # Where the disk is full the library often says nothing.
+    if not is_complete(path.read_bytes(), -(-len(pixels) // ZIP_LINES)):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
 
 def read_exr(path: Path) -> NDArray[np.float32]:

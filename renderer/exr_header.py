@@ -22,6 +22,8 @@ REC709 = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)
 
 HALF, FLOAT = 1, 2
 """Types of a channel."""
+ZIP_LINES = 16
+"""Scan lines of a ZIP-compressed chunk."""
 
 
 def attribute(name: str, value: Attribute) -> bytes:
@@ -52,3 +54,23 @@ def channel_list(channels: Mapping[str, int]) -> bytes:
 def window(width: int, height: int) -> bytes:
     """Value of `dataWindow` or `displayWindow`: first and last pixel."""
     return struct.pack("<4i", 0, 0, width - 1, height - 1)
+
+
+def is_complete(data: bytes, chunks: int) -> bool:
+    """Whether a flat file of one part has all its chunks, the last of them to its end.
+
+    Args:
+        data: The whole file.
+        chunks: How many it should have.
+    """
+    try:
+        at = 8  # magic number, version
+        while data[at] != 0:
+            after_type = data.index(b"\0", data.index(b"\0", at) + 1) + 1
+            at = after_type + 4 + struct.unpack_from("<i", data, after_type)[0]
+        offsets = struct.unpack_from(f"<{chunks}Q", data, at + 1)
+        last = max(offsets)
+        (size,) = struct.unpack_from("<i", data, last + 4)  # behind the number of its first line
+        return bool(min(offsets) > 0 and last + 8 + size <= len(data))
+    except (IndexError, ValueError, struct.error):
+        return False

@@ -101,8 +101,8 @@ class Frame:
         self.gpu, self.ctx, self.view = gpu, gpu.ctx, view
         self.width, self.height, self.pixels = width, height, width * height
         self.clock = Clock(self.ctx)
-        self.uniforms, self._clip = self._camera()
-        self._visible, self.culled_triangles = gpu.clusters.visible(self._clip)
+        self.uniforms, projection, to_view = self._camera()
+        self._visible, self.culled_triangles = gpu.clusters.visible(projection, to_view)
         self.background = self.ctx.texture((width, height), 4)
         self.background.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self.depth = self.ctx.depth_renderbuffer((width, height))
@@ -113,8 +113,8 @@ class Frame:
         with self.clock.measure("opaque"):
             self._draw_opaque(clear)
 
-    def _camera(self) -> tuple[dict[str, object], NDArray[np.float64]]:
-        """What every geometry pass gets, and world to clip space."""
+    def _camera(self) -> tuple[dict[str, object], NDArray[np.float64], NDArray[np.float64]]:
+        """What every geometry pass gets, view to clip space, and world to view space."""
         to_view = self.view.world_to_view()
         near, far = self.view.clip_range(self.gpu.scene.bounds)
         projection = self.view.projection(self.width / self.height, near, far)
@@ -127,7 +127,7 @@ class Frame:
             "up_view": tuple(up.tolist()),
             "width": self.width,
         }
-        return uniforms, projection @ to_view
+        return uniforms, projection, to_view
 
     def _eye_ray(self, projection: NDArray[np.float64]) -> tuple[float, float, float, float]:
         """Scale and offset from window coordinates to x/-z and y/-z in view space; all 0 for parallel rays.

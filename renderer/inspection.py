@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Final
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdShade
 
-from renderer.scene import LoadOptions, load_scene
+from renderer.scene import LoadOptions, load_scene, metres_per_unit
 from renderer.scene_report import CameraFact, Kind, MaterialFact, PrimCount, SceneReport, VariantFact
 from renderer.timecodes import is_animated
 from renderer.usd.cameras import read_cameras
@@ -121,13 +122,13 @@ def _report(stage: Usd.Stage, path: Path, options: LoadOptions, drawn: set[Sdf.P
     for root in (stage.GetPseudoRoot(), *stage.GetPrototypes()):
         for prim in Usd.PrimRange.AllPrims(root):
             census.count(prim)
-    ranged = stage.HasAuthoredTimeCodeRange()
     codes = (stage.GetStartTimeCode(), stage.GetEndTimeCode(), stage.GetTimeCodesPerSecond())
+    ranged = stage.HasAuthoredTimeCodeRange() and all(math.isfinite(code) for code in codes)
     missing = () if path.suffix.lower() == ".usdz" else dependencies(path)
     return SceneReport(
         file=str(path),
         up_axis=str(UsdGeom.GetStageUpAxis(stage)),
-        metres_per_unit=float(UsdGeom.GetStageMetersPerUnit(stage)),
+        metres_per_unit=metres_per_unit(stage, WarningLog()),
         time_codes=codes if ranged else None,
         animated=is_animated(stage),
         prims=dict(sorted(census.prims.items())),
@@ -143,7 +144,7 @@ def _report(stage: Usd.Stage, path: Path, options: LoadOptions, drawn: set[Sdf.P
 
 
 def _cameras(stage: Usd.Stage, options: LoadOptions) -> tuple[CameraFact, ...]:
-    time, metres = stage_time(stage, options.time), float(UsdGeom.GetStageMetersPerUnit(stage))
+    time, metres = stage_time(stage, options.time), metres_per_unit(stage, WarningLog())
     # Where they stand is not reported, and what cannot be used is in the loader's warnings.
     cameras = read_cameras(stage, time, np.zeros(3), metres, WarningLog())
     return tuple(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,12 +25,17 @@ from renderer.usd.textures import TextureTable
 from schemas.problem import ExitCode, Problem
 from schemas.scene import SceneArrays
 
-__all__ = ["LoadOptions", "load_scene", "scene_digest"]
+__all__ = ["LoadOptions", "NothingToDraw", "load_scene", "scene_digest"]
 
 UP_AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 
 MAX_REFINE = 8
 """Each level makes four times as many faces."""
+
+
+class NothingToDraw(Problem):
+    """A scene without geometry at its time, which may have some at another one."""
+
 
 ShapeKey = tuple[Sdf.Path, ...]
 
@@ -58,6 +64,8 @@ class LoadOptions:
     def __post_init__(self) -> None:
         if self.alpha is not None and not 0.0 < self.alpha <= 1.0:
             raise Problem(f"An alpha of {self.alpha} is not possible.", "Give a number above 0 and at most 1.")
+        if self.time is not None and math.isinf(self.time):
+            raise Problem(f"A time of {self.time} is not possible.", "Give a time code.")
         if not 0 <= self.refine <= MAX_REFINE:
             raise Problem(
                 f"Refining by {self.refine} levels is not possible.", f"Give a number from 0 to {MAX_REFINE}."
@@ -103,13 +111,13 @@ class _StageReader:
         self._time = stage_time(stage, options.time)
         self._textures = TextureTable()
         self._materials = MaterialTable(self._time, self._textures, log)
-        self._metres = _metres_per_unit(stage, log)
+        self._metres = metres_per_unit(stage, log)
 
     def read(self) -> SceneArrays:
         """The whole scene, without the warnings."""
         placed = self._placed()
         if not placed:
-            raise Problem(
+            raise NothingToDraw(
                 f"{self._path} has no geometry that can be drawn.",
                 "Check that it has visible meshes or gprims of purpose default or render.",
                 ExitCode.USAGE,
@@ -149,7 +157,7 @@ class _StageReader:
                 self._watch(draw, parts[key])
         scale = np.diag([self._metres, self._metres, self._metres, 1.0])
         places = {key: product(np.concatenate(some), scale) for key, some in matrices.items()}
-        return [Placed(part, places[key]) for key, shape_parts in parts.items() for part in shape_parts]
+        return [Placed(part, places[key], str(key[0])) for key, shape_parts in parts.items() for part in shape_parts]
 
 
 def shape_key(draw: Draw) -> ShapeKey:
@@ -167,7 +175,8 @@ def shape_key(draw: Draw) -> ShapeKey:
     return tuple(key)
 
 
-def _metres_per_unit(stage: Usd.Stage, log: WarningLog) -> float:
+def metres_per_unit(stage: Usd.Stage, log: WarningLog) -> float:
+    """Metres per stage unit: USD's default, with a warning, where what is authored is no length."""
     metres = float(UsdGeom.GetStageMetersPerUnit(stage))
     if not (np.isfinite(metres) and metres > 0.0):
         log.add(f"metersPerUnit is {metres}, 0.01 is used", "/")

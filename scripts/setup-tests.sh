@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Sees to what only the tests need: PostgreSQL's programs, with which the tests start servers of their own, and Mesa's
-# zink over its software Vulkan driver, on which they draw every technique a second time.
+# Sees to what only the tests need: PostgreSQL's programs, with which the tests start servers of their own; Mesa's zink
+# over its software Vulkan driver, on which they draw every technique a second time; the reference compiler of GLSL.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=scripts/common.sh
@@ -22,4 +22,7 @@ fi
 if ! have_zink; then
     apt_install "zink has no Vulkan driver" mesa-vulkan-drivers libvulkan1
     have_zink || say "zink still makes no OpenGL context: tests/integration/test_zink.py will fail."
+fi
+if ! command -v glslangValidator >/dev/null; then
+    apt_install "the reference compiler of GLSL is missing" glslang-tools
 fi

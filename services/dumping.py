@@ -17,6 +17,7 @@ from renderer.scene import LoadOptions
 from schemas.fragments import FragmentDump
 from schemas.problem import Problem
 from services.local_scenes import LocalScene, as_usd
+from services.writing import replacing
 
 DEEP = ".exr"
 DEEP_NAME = "fragments.exr"
@@ -114,9 +115,9 @@ def dump(options: DumpOptions) -> Dumped:
         if options.deep or options.output.suffix.lower() == DEEP:
             path = options.output if options.output.suffix.lower() == DEEP else options.output / DEEP_NAME
             start = time.perf_counter()
-            path.parent.mkdir(parents=True, exist_ok=True)
             camera = camera_attributes(chosen.view, scene, *size)
-            write_deep_exr(path, captured.dump, opaque_depth(frame), {**camera, "software": "diaphane"})
+            with replacing(path) as made:
+                write_deep_exr(made, captured.dump, opaque_depth(frame), {**camera, "software": "diaphane"})
             written.append(Written(path, path.stat().st_size, 1e3 * (time.perf_counter() - start)))
     return _dumped(captured.dump, (chosen.view.name, chosen.how), captured.passes, written, scene.warnings)
 
@@ -131,10 +132,10 @@ def _imported(options: DumpOptions) -> Dumped:
 
 def _zarr(folder: Path, found: FragmentDump, about: dict[str, Any]) -> Written:
     start = time.perf_counter()
-    folder.mkdir(parents=True, exist_ok=True)
-    write_dump(folder, found, about)
-    ms = 1e3 * (time.perf_counter() - start)
     path = folder / ZARR_NAME
+    with replacing(path) as made:
+        write_dump(made.parent, found, about)
+    ms = 1e3 * (time.perf_counter() - start)
     return Written(path, sum(file.stat().st_size for file in path.rglob("*") if file.is_file()), ms)
 
 

@@ -16,7 +16,7 @@ from renderer.gpu_scene import GpuScene
 from renderer.scene import LoadOptions, load_scene
 from renderer.timecodes import is_animated
 from renderer.usd.cameras import StageCamera, read_cameras
-from renderer.usd.stage import WarningLog, stage_time
+from renderer.usd.stage import WarningLog, stage_time, usd_diagnostics
 from renderer.views import ASPECT, FRAMING_ASPECT, framing_view, listed_views, placed_views
 from schemas.problem import ExitCode, Problem
 from schemas.scene import SceneArrays
@@ -129,7 +129,9 @@ class LocalScene:
     def cameras(self) -> tuple[StageCamera, ...]:
         """The stage's cameras."""
         scene = self.now.scene
-        return read_cameras(self.now.stage, self.now.time, scene.origin, scene.metres_per_unit, WarningLog())
+        # What cannot be used was reported when the scene was loaded.
+        with usd_diagnostics(WarningLog()):
+            return read_cameras(self.now.stage, self.now.time, scene.origin, scene.metres_per_unit, WarningLog())
 
     def views(self, camera: str | None, listed: Path | None) -> tuple[Chosen, ...]:
         """The views to render.

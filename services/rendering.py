@@ -17,6 +17,7 @@ from renderer.exr import camera_attributes, write_exr
 from renderer.exr_header import Attribute
 from renderer.frame import Frame
 from renderer.hidden import hidden_fragments
+from renderer.scene import NothingToDraw
 from renderer.techniques import TECHNIQUES, Budget, Rendered, SBuffer, Technique, technique
 from renderer.techniques.skips import HIDDEN_FRAGMENTS
 from renderer.timecodes import numbered
@@ -26,6 +27,7 @@ from services.local_scenes import Chosen, LocalScene, as_usd
 from services.progress import Progress
 from services.render_options import RenderOptions
 from services.stages.pictures import write_png
+from services.writing import replacing
 
 _WARM_SIZE = (64, 48)
 """Drivers compile shaders at their first use: what is timed is not the first."""
@@ -131,8 +133,17 @@ def _scene(
 ) -> Iterator[Picture]:
     warm: set[str] = set()
     told: set[str] = set()
+    left_out: list[Problem] = []
     for time in options.frames or (None,):
-        for warning in scene.at(time).warnings:
+        try:
+            warnings = scene.at(time).warnings
+        except NothingToDraw as problem:
+            left_out.append(problem)
+            if len(left_out) >= len(options.frames):
+                raise
+            progress.note(f"warning: frame {time:g} is left out. {problem.title}")
+            continue
+        for warning in warnings:
             if warning not in told:
                 progress.note(f"warning: {scene.file}: {warning}")
                 told.add(warning)
@@ -215,9 +226,9 @@ def _compared(found: Picture, rendered: Rendered, exact: Rendered) -> Picture:
 
 
 def _write(found: Picture, rendered: Rendered, job: _Job, options: RenderOptions) -> None:
-    found.file.parent.mkdir(parents=True, exist_ok=True)
     if found.file.suffix.lower() == ".png":
-        write_png(found.file, display8(rendered.linear))
+        with replacing(found.file) as path:
+            write_png(path, display8(rendered.linear))
         return
     passes = found.passes or {}
     attributes: dict[str, Attribute] = {
@@ -232,7 +243,8 @@ def _write(found: Picture, rendered: Rendered, job: _Job, options: RenderOptions
         attributes |= {"budget": str(found.budget), "tail": found.tail, "g": options.g}
     scene = job.scene.gpu().scene
     attributes |= camera_attributes(job.chosen.view, scene, found.width, found.height)
-    write_exr(found.file, rendered.linear, attributes, options.is_full)
+    with replacing(found.file) as path:
+        write_exr(path, rendered.linear, attributes, options.is_full)
 
 
 def size_of(options: RenderOptions, aspect: float) -> tuple[int, int]:

@@ -10,12 +10,16 @@ from renderer.techniques.chain import render_chain
 
 
 class KBuffer:
-    """Fixed k = floor(F / (W H)); a pixel's unused slots stay empty, as in a fixed array."""
+    """Fixed k = floor(F / (W H)); a pixel's unused slots stay empty, as in a fixed array.
+
+    No more slots than the fullest pixel has fragments: the others would be empty everywhere.
+    """
 
     name = "kbuffer"
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame with the same number of slots everywhere."""
         n = frame.count()
-        slots = np.full(frame.pixels, budget.fragments // frame.pixels, dtype=np.int32)
+        k = min(budget.fragments // frame.pixels, int(n.max()))
+        slots = np.full(frame.pixels, k, dtype=np.int32)
         return render_chain(frame, slots, n, budget)

@@ -61,7 +61,7 @@ class KBufferDeep:
         clock = Clock(frame.ctx)
         slots, settled = self._allocate(frame, n, budget.fragments, clock)
         rendered = render_chain(frame, slots, n, budget, gathered)
-        unread = len(ALL_TEXELS - self._texels)
+        unread = len(ALL_TEXELS - self._texels - {0})  # n is always gathered
         skips = {**rendered.skips, SETTLED_PIXELS: settled, UNREAD_SUMS: unread}
         return replace(rendered, passes={**rendered.passes, **clock.passes}, skips=skips)
 

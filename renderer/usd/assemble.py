@@ -14,15 +14,19 @@ from schemas.scene import Batch
 MAX_TRIANGLES = 60_000_000
 """About 3.5 GB of arrays when every corner is its own vertex."""
 
+FARTHEST = 1e30
+"""Metres from the stage's origin, along each axis."""
+
 LAYER_ORDER = {"opaque": 0, "mixed": 1, "transparent": 2}
 
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """A part and where its copies stand: matrices float64 [M, 4, 4] (`p' = p @ M`), to metres in stage space."""
+    """A part, where its copies stand (float64 [M, 4, 4], `p' = p @ M`, to metres in stage space), and its prim."""
 
     part: Part
     matrices: NDArray[np.float64]
+    path: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,12 +75,12 @@ def _bounds(placed: list[Placed]) -> tuple[NDArray[np.float64], NDArray[np.float
         for matrices in _chunks(item):
             points = _transform(item.part.positions, matrices)
             low, high = np.minimum(low, points.min(axis=(0, 1))), np.maximum(high, points.max(axis=(0, 1)))
-    if not (np.isfinite(low).all() and np.isfinite(high).all()) or np.max(np.abs((low, high))) > 1e30:
-        raise Problem(
-            "The scene's transforms put geometry at coordinates that are not finite.",
-            "Look for a transform with NaN, infinite or huge numbers.",
-            ExitCode.USAGE,
-        )
+            if not np.all(np.abs((low, high)) <= FARTHEST):
+                raise Problem(
+                    f"{item.path} has copies at coordinates that are not finite, or huge.",
+                    "Look for NaN, infinite or huge numbers in its points, its transforms and its instancers.",
+                    ExitCode.USAGE,
+                )
     return low, high
 
 

@@ -9,11 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
+from renderer.usd.drivers import floats_of
 from renderer.usd.stage import WarningLog
+from renderer.usd.transforms import Transforms
 from schemas.view import View
 
 APERTURE_UNIT = 0.1
 """USD gives apertures and focal lengths in tenths of a scene unit."""
+OPENINGS = (1e-6, 1e6)
+"""Tangents of half the angle of view that a picture can be made with."""
+WINDOWS = (1e-12, 1e15)
+"""Heights of an orthographic window that a picture can be made with, metres."""
+FARTHEST = 1e20
+"""Metres from the scene to a camera, along each axis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +51,12 @@ def read_cameras(
         metres: Metres per stage unit.
         log: Gets a line for every camera that cannot be used.
     """
-    cache = UsdGeom.XformCache(time)
+    transforms = Transforms(time, log)
     cameras: list[StageCamera] = []
     for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         if not prim.IsA(UsdGeom.Camera):
             continue
-        matrix = np.array(cache.GetLocalToWorldTransform(prim), dtype=np.float64)
-        view = _view(UsdGeom.Camera(prim), matrix, time, origin, metres, log)
+        view = _view(UsdGeom.Camera(prim), transforms.to_world(prim), time, origin, metres, log)
         if view is not None:
             taken = {camera.view.name for camera in cameras}
             number = 2
@@ -63,8 +70,8 @@ def read_cameras(
 
 def _aspect(camera: UsdGeom.Camera, time: Usd.TimeCode) -> float:
     """Width / height of the aperture; 1 where it has none, as `usdrecord` has it."""
-    width, height = camera.GetHorizontalApertureAttr().Get(time), camera.GetVerticalApertureAttr().Get(time)
-    aspect = float(width) / float(height) if width and height else 0.0
+    width, height = _number(camera.GetHorizontalApertureAttr(), time), _number(camera.GetVerticalApertureAttr(), time)
+    aspect = width / height if height else 0.0
     return aspect if math.isfinite(aspect) and aspect > 1e-4 else 1.0
 
 
@@ -77,25 +84,35 @@ def _view(
     log: WarningLog,
 ) -> View | None:
     path = camera.GetPath()
-    aperture = float(camera.GetVerticalApertureAttr().Get(time) or 0.0)
-    focal = float(camera.GetFocalLengthAttr().Get(time) or 0.0)
+    aperture = _number(camera.GetVerticalApertureAttr(), time)
+    focal = _number(camera.GetFocalLengthAttr(), time)
     ortho = camera.GetProjectionAttr().Get(time) == UsdGeom.Tokens.orthographic
+    # A window's height over its distance; an orthographic one has only a height, in metres.
+    opening = aperture * APERTURE_UNIT * metres if ortho else _ratio(aperture, 2.0 * focal)
+    least, most = WINDOWS if ortho else OPENINGS
     back, up = (_direction(matrix[row, :3]) for row in (2, 1))
-    sizes = (aperture, focal if not ortho else 1.0)
-    if back is None or up is None or not all(math.isfinite(s) and s > 0.0 for s in sizes):
+    eye = matrix[3, :3] * metres - origin
+    if (
+        (back is None or up is None)
+        or not np.all(np.abs(eye) < FARTHEST)
+        or np.linalg.norm(np.cross(back, up)) < 1e-6
+        or not least <= opening <= most
+    ):
         log.add("the camera's transform, aperture or focal length cannot be used, left out", path)
         return None
-    eye = matrix[3, :3] * metres - origin
-    distance = _focus(camera, time) * metres
-    target = eye - back * (distance if distance > 0.0 else max(float(np.linalg.norm(eye)), 1e-3))
-    near, far = _clipping(camera, time, metres)
+    if np.linalg.det(matrix[:3, :3]) < 0.0:
+        log.add("the camera's transform mirrors, its picture is not mirrored", path)
+    distance, away = _focus(camera, time) * metres, float(np.linalg.norm(eye))
+    # A target too near to tell from the eye would be no target.
+    target = eye - back * (distance if distance > 1e-6 * away else max(away, 1e-3))
+    near, far = _clipping(camera, time, metres, log)
     return View(
         name=str(camera.GetPrim().GetName()),
         eye=_vec3(eye),
         target=_vec3(target),
         up=_vec3(up),
-        fov=45.0 if ortho else math.degrees(2.0 * math.atan(aperture / (2.0 * focal))),
-        ortho_height=aperture * APERTURE_UNIT * metres if ortho else None,
+        fov=45.0 if ortho else math.degrees(2.0 * math.atan(opening)),
+        ortho_height=opening if ortho else None,
         near=near,
         far=far,
         shift=_shift(camera, time, aperture, log),
@@ -104,28 +121,44 @@ def _view(
 
 def _shift(camera: UsdGeom.Camera, time: Usd.TimeCode, aperture: float, log: WarningLog) -> tuple[float, float]:
     """Aperture offsets in picture heights; a picture of another shape than the aperture keeps its height (GfCamera)."""
-    offsets = (camera.GetHorizontalApertureOffsetAttr().Get(time), camera.GetVerticalApertureOffsetAttr().Get(time))
-    right, up = (float(offset or 0.0) / aperture for offset in offsets)
+    offsets = (camera.GetHorizontalApertureOffsetAttr(), camera.GetVerticalApertureOffsetAttr())
+    right, up = (_ratio(_number(offset, time), aperture) for offset in offsets)
     if not (math.isfinite(right) and math.isfinite(up)):
         log.add("the camera's aperture offset is not finite, left out", camera.GetPath())
         return 0.0, 0.0
     return right, up
 
 
-def _clipping(camera: UsdGeom.Camera, time: Usd.TimeCode, metres: float) -> tuple[float | None, float | None]:
+def _clipping(
+    camera: UsdGeom.Camera, time: Usd.TimeCode, metres: float, log: WarningLog
+) -> tuple[float | None, float | None]:
     """Authored near and far distance, metres; a default of 1 unit would cut scenes that are small."""
+    if camera.GetClippingPlanesAttr().Get(time):
+        log.add("the camera's clipping planes are not used", camera.GetPath())
     attribute = camera.GetClippingRangeAttr()
     if not attribute.HasAuthoredValue():
         return None, None
-    near, far = (float(x) * metres for x in attribute.Get(time))
-    if not (math.isfinite(near) and math.isfinite(far) and far > near):
+    authored = floats_of(attribute.Get(time), 2)
+    if authored is None or authored[1] <= authored[0]:
+        log.add("the camera's clipping range is not used, it is none", camera.GetPath())
         return None, None
+    near, far = authored[0] * metres, authored[1] * metres
     return (near if near > 0.0 else None), (far if far > 0.0 else None)
 
 
 def _focus(camera: UsdGeom.Camera, time: Usd.TimeCode) -> float:
-    distance = float(camera.GetFocusDistanceAttr().Get(time) or 0.0)
+    distance = _number(camera.GetFocusDistanceAttr(), time)
     return distance if math.isfinite(distance) else 0.0
+
+
+def _number(attribute: Usd.Attribute, time: Usd.TimeCode) -> float:
+    """The attribute's value; not a number if it has none, or one that is not finite or of another type."""
+    found = floats_of(attribute.Get(time), 1)
+    return found[0] if found else math.nan
+
+
+def _ratio(a: float, b: float) -> float:
+    return a / b if b else math.nan
 
 
 def _direction(row: NDArray[np.float64]) -> NDArray[np.float64] | None:

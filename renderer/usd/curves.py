@@ -145,7 +145,7 @@ def _authored_normals(curves: UsdGeom.BasisCurves, along: PrimvarReader) -> Floa
     else:
         values = curves.GetNormalsAttr().Get(along.time)
         interpolation = str(curves.GetNormalsInterpolation())
-        found = None if values is None or not len(values) else along.fit("normals", values, interpolation, 3)
+        found = None if values is None else along.fit("normals", values, interpolation, 3)
     return None if found is None else found.values.astype(np.float64)
 
 

@@ -30,7 +30,11 @@ def read_shape(prim: Usd.Prim, reading: Reading) -> Shape | None:
         return curves_shape(prim, reading)
     if prim.IsA(UsdGeom.Points):
         return points_shape(prim, reading)
-    surface = gprim_surface(prim, reading.time)
+    try:
+        surface = gprim_surface(prim, reading.time)
+    except ValueError as error:
+        reading.log.add(f"the prim is left out, {error}", prim.GetPath())
+        return None
     if surface is None:
         reading.log.add(f"{prim.GetTypeName()} prims are not drawn", prim.GetPath())
         return None

@@ -9,12 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Usd, UsdGeom
 
+from renderer.usd.drivers import floats_of
 from renderer.usd.topology import Attribute
 
 AROUND = 32
 """Segments around an axis."""
 ALONG = 16
 """Segments from pole to pole of a sphere."""
+AXES = ("X", "Y", "Z")
+HUGE = 1e30
+"""A measure beyond this cannot be drawn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,19 +32,32 @@ class Surface:
 
 
 def gprim_surface(prim: Usd.Prim, time: Usd.TimeCode) -> Surface | None:
-    """The polygons of an implicit gprim in its own space; None if the type is not one of those above."""
+    """The polygons of an implicit gprim in its own space; None if the type is not one of those above.
+
+    Raises:
+        ValueError: One of its measures is no number of a sensible size, or its axis is none.
+    """
 
     def number(name: str) -> float:
-        return float(prim.GetAttribute(name).Get(time))
+        found = floats_of(prim.GetAttribute(name).Get(time), 1)
+        if found is None or abs(found[0]) > HUGE:
+            raise ValueError(f"its {name} is no number that can be used")
+        return found[0]
+
+    def axis() -> str:
+        found = str(prim.GetAttribute("axis").Get(time))
+        if found not in AXES:
+            raise ValueError(f"its axis {found} is none of {', '.join(AXES)}")
+        return found
 
     if prim.IsA(UsdGeom.Cube):
         return _cube(number("size"))
     if prim.IsA(UsdGeom.Plane):
-        return _plane(number("width"), number("length"), str(prim.GetAttribute("axis").Get(time)))
+        return _plane(number("width"), number("length"), axis())
     if prim.IsA(UsdGeom.Sphere):
         return _lathe(_arc(number("radius"), 0.0, -90.0, 90.0, ALONG), "Z")
     profile = _axial_profile(prim, number)
-    return None if profile is None else _lathe(profile, str(prim.GetAttribute("axis").Get(time)))
+    return None if profile is None else _lathe(profile, axis())
 
 
 Profile = list[tuple[NDArray[np.float64], NDArray[np.float64]]]

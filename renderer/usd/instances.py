@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 from pxr import Sdf, Usd, UsdGeom
 
 from renderer.usd.native import Likeness
+from renderer.usd.shape import integers
 from renderer.usd.skel import EVERYTHING, Skin, Skins
 from renderer.usd.stage import WarningLog
+from renderer.usd.transforms import Transforms
 from schemas.problem import ExitCode, Problem
 
 DRAWN_PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
@@ -49,7 +51,7 @@ class Walker:
     def __init__(self, time: Usd.TimeCode, log: WarningLog) -> None:
         self._time = time
         self._log = log
-        self._cache = UsdGeom.XformCache(time)
+        self._transforms = Transforms(time, log)
         self._skins: Skins | None = None
         self._likeness = Likeness()
         self._alike: dict[Hashable, list[Usd.Prim]] = {}
@@ -109,8 +111,8 @@ class Walker:
 
     def _matrix(self, prim: Usd.Prim, relative_to: Usd.Prim | None) -> NDArray[np.float64]:
         if relative_to is None:
-            return np.array(self._cache.GetLocalToWorldTransform(prim), dtype=np.float64)
-        return np.array(self._cache.ComputeRelativeTransform(prim, relative_to)[0], dtype=np.float64)
+            return self._transforms.to_world(prim)
+        return self._transforms.to_ancestor(prim, relative_to)
 
     def _instanced(
         self, instancer: UsdGeom.PointInstancer, relative_to: Usd.Prim | None, parents: tuple[Sdf.Path, ...]
@@ -124,6 +126,10 @@ class Walker:
             return
         which, local = placed
         matrices = product(local, self._matrix(instancer.GetPrim(), relative_to))
+        for primvar in UsdGeom.PrimvarsAPI(instancer).GetPrimvarsWithAuthoredValues():
+            # Those with a colon in their names are some renderer's own.
+            if primvar.GetInterpolation() != UsdGeom.Tokens.constant and ":" not in primvar.GetPrimvarName():
+                self._log.add(f"primvar {primvar.GetPrimvarName()} of single instances is not used", path)
         if np.any((which < 0) | (which >= len(instancer.GetPrototypesRel().GetForwardedTargets()))):
             self._log.add("instances of prototypes that do not exist are left out", path)
         for index, target in enumerate(instancer.GetPrototypesRel().GetForwardedTargets()):
@@ -133,7 +139,7 @@ class Walker:
                 self._log.add("a prototype is missing", target)
             elif len(copies):
                 # Prototypes may be `over`s, so that they are not drawn where they stand.
-                copies = product(np.array(self._cache.GetLocalTransformation(prototype)[0]), copies)
+                copies = product(self._transforms.own(prototype), copies)
                 for draw in self._under(prototype, prototype, EVERYTHING, (*parents, path)):
                     yield Draw(draw.prim, _combine(draw.matrices, copies, draw.prim), draw.skin)
 
@@ -142,15 +148,14 @@ class Walker:
 
         The prototypes' own transforms are not in them: with those USD gives up where one index is wrong.
         """
-        indices = instancer.GetProtoIndicesAttr().Get(self._time)
-        count = len(indices) if indices is not None else 0
+        which = integers(instancer.GetProtoIndicesAttr().Get(self._time))
+        count = len(which)
         if count == 0:
             self._log.add("the point instancer has no instances", instancer.GetPath())
             return None
         matrices = instancer.ComputeInstanceTransformsAtTime(
             self._time, self._time, UsdGeom.PointInstancer.ExcludeProtoXform, UsdGeom.PointInstancer.IgnoreMask
         )
-        which = np.asarray(indices, dtype=np.int64)
         placed = np.asarray(matrices, dtype=np.float64).reshape(-1, 4, 4)
         if len(placed) != count:
             self._log.add("the point instancer's arrays differ in length, left out", instancer.GetPath())

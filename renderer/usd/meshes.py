@@ -88,9 +88,7 @@ def _authored_normals(
         found = reader.read("normals", 3)
     else:
         values = mesh.GetNormalsAttr().Get(reader.time)
-        if values is None or len(values) == 0:
-            return None
-        found = reader.fit("normals", values, str(mesh.GetNormalsInterpolation()), 3)
+        found = None if values is None else reader.fit("normals", values, str(mesh.GetNormalsInterpolation()), 3)
     return found if found is None or reading.skin is None else reading.skin.normals(found, topology)
 
 
@@ -98,14 +96,16 @@ def _complete(authored: Attribute | None, points: NDArray[np.float64], topology:
     """Authored normals with zero ones replaced, else computed ones: smooth on cages, creased on polygons."""
     if authored is None:
         return vertex_normals(points, topology) if smooth else creased_normals(points, topology)
-    lengths = np.linalg.norm(authored.values, axis=1)
+    # In double precision: the squares of large ones are beyond float32.
+    lengths = np.linalg.norm(authored.values.astype(np.float64), axis=1)
     if not np.any(lengths < 1e-8):
         return Attribute(unit_rows(authored.values), authored.domain)
     computed = topology.spread(face_normals(points, topology), "corner")
     given = topology.spread(authored, "corner")
-    bad = np.linalg.norm(given, axis=1) < 1e-8
+    bad = np.linalg.norm(given.astype(np.float64), axis=1) < 1e-8
     return Attribute(unit_rows(np.where(bad[:, None], computed, given)), "corner")
 
 
 def _numbers(values: object) -> NDArray[np.float64]:
-    return np.zeros(0) if values is None else np.asarray(values, dtype=np.float64).reshape(-1)
+    array = np.asarray(values)
+    return array.astype(np.float64).reshape(-1) if array.dtype.kind in "iuf" else np.zeros(0)

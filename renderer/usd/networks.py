@@ -101,6 +101,8 @@ class Network:
         for attribute in UsdShade.Utils.GetValueProducingAttributes(shade_input):
             if UsdShade.Output.IsOutput(attribute):
                 return UsdShade.Shader(attribute.GetPrim()), UsdShade.Output(attribute).GetBaseName()
+        for gone in shade_input.GetConnectedSources()[1]:
+            self.log.add(f"{shade_input.GetBaseName()} is connected to what does not exist", gone)
         return None, ""
 
     def value(self, shade_input: UsdShade.Input) -> Any:
@@ -221,8 +223,8 @@ class Network:
         if kind in _PRIMVAR_INPUTS:
             name, fallback = _PRIMVAR_INPUTS[kind]
             given = self.value(node.GetInput(fallback))
-            missing = None if given is None else vec4_of((*given, 0.0, 0.0), ZEROS)[:2]
-            return self.text(node, name, "st"), missing
+            pair = floats_of(given, 2)
+            return self.text(node, name, "st"), (pair[0], pair[1]) if pair else None
         self.log.add(f"{node.GetShaderId()} cannot give texture coordinates, st is used", node.GetPath())
         return "st", None
 

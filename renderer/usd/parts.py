@@ -13,7 +13,7 @@ from pxr import Sdf, Usd
 from renderer.usd.attributes import SurfaceAttributes, target_of
 from renderer.usd.bindings import bindings
 from renderer.usd.materials import DISPLAY, MaterialTable
-from renderer.usd.shape import Shape
+from renderer.usd.shape import Shape, integers
 from renderer.usd.surfaces import Surface
 from renderer.usd.textures import TextureTable
 from renderer.usd.topology import area_vectors
@@ -74,7 +74,7 @@ def _surfaces(prim: Usd.Prim, shape: Shape, table: MaterialTable) -> Iterator[tu
     for owner, (_, subset) in enumerate(bound):
         faces = None if subset is None else subset.GetIndicesAttr().Get(table.time)
         if faces is not None:
-            wanted = np.asarray(faces, dtype=np.int64)
+            wanted = integers(faces)
             there = (wanted >= 0) & (wanted < len(face_owner))
             if subset is not None and not there.all():
                 table.log.add(f"{np.count_nonzero(~there)} of its faces do not exist; ignored", subset.GetPath())

@@ -80,8 +80,9 @@ def floats(values: object) -> NDArray[np.float64]:
 
 
 def integers(values: object) -> NDArray[np.int64]:
-    """A list of numbers as int64 [n]; empty if it is absent."""
-    return np.zeros(0, np.int64) if values is None else np.asarray(values, dtype=np.int64).reshape(-1)
+    """A list of whole numbers as int64 [n]; empty if it is absent or of another type."""
+    array = np.asarray(values)
+    return array.astype(np.int64).reshape(-1) if array.dtype.kind in "iu" else np.zeros(0, np.int64)
 
 
 def check_finite(points: NDArray[np.float64], prim: Usd.Prim) -> None:

@@ -17,6 +17,8 @@ from pxr import Gf, Sdf, Usd, UsdSkel, Vt
 from renderer.usd.stage import WarningLog, canonical_path
 from renderer.usd.topology import Attribute, Domain, Topology
 
+HUGE = 1e20
+"""No joint moves anything this far."""
 EVERYTHING = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)
 """Also what only stands in an `over`, as prototypes of point instancers may."""
 
@@ -72,7 +74,8 @@ class Skins:
 
     def _pose(self, skeleton: UsdSkel.SkeletonQuery) -> Vt.Matrix4dArray | None:
         transforms = skeleton.ComputeSkinningTransforms(self._time)
-        if not transforms or not np.isfinite(np.asarray(transforms)).all():
+        # A bind transform without an inverse makes numbers that are finite, but huge.
+        if not transforms or not np.all(np.abs(np.asarray(transforms)) < HUGE):
             self._log.add("the skeleton has no pose, its meshes keep their bind pose", skeleton.GetPrim().GetPath())
             return None
         return transforms
@@ -224,6 +227,8 @@ def _offsets(shapes: UsdSkel.BlendShapeQuery, shape: int, part: int, normals: bo
         values = between.GetNormalOffsets() if normals else between.GetOffsets()
     else:
         target = shapes.GetBlendShape(shape)
+        if not target:
+            return None
         values = (target.GetNormalOffsetsAttr() if normals else target.GetOffsetsAttr()).Get()
     return None if values is None or not len(values) else np.asarray(values, dtype=np.float64)
 

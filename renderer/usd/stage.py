@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -50,11 +51,12 @@ def usd_diagnostics(log: WarningLog) -> Iterator[None]:
                 # The material reader reads these documents itself, and reports those that it cannot.
                 continue
             text = re.sub(r"(Could not open asset @[^@]*@).*$", r"\1", text, flags=re.DOTALL)
+            text = re.sub(r"\s+", " ", re.sub(r"<?0x[0-9a-f]+>?", "", text)).strip()
             where = re.match(r"In <([^>]+)>: (.*)$", text, flags=re.DOTALL)
             if where:
                 log.add(where.group(2), where.group(1))
             else:
-                log.add("USD says", re.sub(r"<?0x[0-9a-f]+>?", "", text))
+                log.add("USD says", text)
 
 
 def check_file(path: Path) -> None:
@@ -105,7 +107,7 @@ def stage_time(stage: Usd.Stage, time: float | None) -> Usd.TimeCode:
     """
     if time is not None:
         return Usd.TimeCode(time)
-    if stage.HasAuthoredMetadata("startTimeCode"):
+    if stage.HasAuthoredMetadata("startTimeCode") and math.isfinite(stage.GetStartTimeCode()):
         return Usd.TimeCode(stage.GetStartTimeCode())
     return Usd.TimeCode.EarliestTime()
 

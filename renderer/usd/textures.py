@@ -127,7 +127,7 @@ def read_asset(resolved: str) -> bytes:
     asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(resolved)) if resolved else None
     if not asset:
         raise TextureUnreadable("the texture is missing")
-    return bytes(asset.GetBuffer())
+    return bytes(asset.GetBuffer() or b"")  # an empty file has no buffer
 
 
 def decode_image(data: bytes, space: str = "auto", max_side: int = MAX_SIDE) -> Decoded:

@@ -128,7 +128,7 @@ def _disk(error: OSError) -> Problem:
     where = f"{error.filename}: " if error.filename else ""
     return Problem(
         f"{where}{error.strerror or error}.",
-        "Make room, or name a folder that can be written with --state; the same command then continues.",
+        "Make room, or name a folder that can be written, also with --state; the same command then continues.",
         ExitCode.TRY_AGAIN,
     )
 

@@ -124,7 +124,7 @@ class _Everything:
     def __init__(self, runs: tuple[Batch, ...]) -> None:
         self._runs = [[(batch.first // 3, batch.count // 3)] for batch in runs]
 
-    def visible(self, _: np.ndarray) -> tuple[list[Ranges], int]:
+    def visible(self, *_: np.ndarray) -> tuple[list[Ranges], int]:
         return self._runs, 0
 
 

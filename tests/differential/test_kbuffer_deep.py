@@ -117,14 +117,17 @@ def test_only_what_the_bundle_reads_is_gathered(
     assert rendered.skips[SETTLED_PIXELS] == np.count_nonzero(dump.counts == 1)
 
 
+@pytest.mark.parametrize("names", [("log_n", "alpha_mean", "depth_extent"), ("depth_extent",)])
 def test_a_bundle_that_reads_no_nearest_fragment_does_not_gather_it(
-    tmp_path: Path, frame: Frame, dump: FragmentDump, gl: moderngl.Context
+    tmp_path: Path, frame: Frame, dump: FragmentDump, gl: moderngl.Context, names: tuple[str, ...]
 ) -> None:
-    names = ("log_n", "alpha_mean", "depth_extent")
     network = random_weights(4, names)
     export_random(tmp_path, network, derive(gather(dump))[dump.counts > 0], gl)
     deep = KBufferDeep(tmp_path)
-    assert frame.gather("gather", texels_of(names)).nearest_colour is None
+    gathered = frame.gather("gather", texels_of(names))
+    assert gathered.nearest_colour is None
+    assert gathered.pixel_bytes == 16
+    assert deep.render(frame, Budget(dump.total // 3)).skips[UNREAD_SUMS] == 5, "all but the first"
     pixels = np.flatnonzero(dump.counts > 1).astype(np.uint32)
     expected = np.stack(network.predict(derive(gather(dump))[pixels]), axis=1)
     np.testing.assert_allclose(deep.predict(frame, pixels), expected, rtol=1e-3, atol=1e-3)

@@ -9,9 +9,11 @@ import moderngl
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from support import stacks
 from support.scenes import SIZE, VIEW, shells
 
 from labeller.curves import composite
+from renderer.capture import capture
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.reference import moment, stochastic, weighted_average, weighted_blended
@@ -58,6 +60,19 @@ def test_the_picture_is_its_twins(frame: Frame, dump: FragmentDump, case: str) -
     error = np.abs(made.render(frame, UNUSED).linear.reshape(-1, 3) - twin(dump))
     assert error.max() <= bound
     assert np.quantile(error, 0.999) <= 1e-6
+
+
+def test_weights_by_depth_have_a_floor_at_the_far_plane(gl: moderngl.Context) -> None:
+    rng = np.random.default_rng(3)
+    near = stacks.Stack(np.array([0.5]), np.array([128]))
+    far = stacks.Stack(np.linspace(985.0, 1000.0, 8), rng.integers(1, 255, 8))
+    scene = stacks.stack_scene({"near": near, "far": far})
+    frame = Frame(GpuScene(gl, scene), stacks.VIEW, *stacks.size(2))
+    planes = stacks.VIEW.clip_range(scene.bounds)
+    truth = weighted_blended.picture(capture(frame).dump, *planes)
+    assert frame.count().max() == 8
+    linear = WeightedBlended().render(frame, UNUSED).linear.reshape(-1, 3)
+    np.testing.assert_allclose(linear, truth, atol=1e-6, rtol=0)
 
 
 @pytest.mark.parametrize("name", NAMES)

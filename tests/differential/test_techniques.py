@@ -27,6 +27,13 @@ def test_any_allocation_looks_as_simulated__tail(frame: Frame, dump: FragmentDum
     np.testing.assert_allclose(rendered.linear, simulate(dump, rendered.k, tail), atol=3e-6, rtol=0)
 
 
+@pytest.mark.parametrize("g", [0.0, 2.0])
+def test_the_density_tails_constant_is_the_budgets__g(frame: Frame, dump: FragmentDump, g: float) -> None:
+    one = np.minimum(dump.counts, 1).astype(np.int32)
+    rendered = KBufferOptimal(lambda *_: one).render(frame, Budget(0, g=g))
+    np.testing.assert_allclose(rendered.linear, simulate(dump, one, "density", g), atol=3e-6, rtol=0)
+
+
 def test_slots_beyond_n_stay_empty_and_the_picture_is_exact(frame: Frame, dump: FragmentDump) -> None:
     most = int(dump.counts.max())
     rendered = KBuffer().render(frame, Budget(most * frame.pixels))

@@ -325,3 +325,24 @@ def test_real_scenes_are_inspected_and_rendered(name: str, capsys: pytest.Captur
     (picture,) = answer(capsys, "render", file, "-w", "64", "-o", "a.png")["pictures"]
     assert picture["fragments"] > 0
     assert len(np.unique(pixels(Path("a.png")).reshape(-1, 3), axis=0)) > 20
+
+
+def test_frames_of_a_sequence_without_anything_to_draw_are_left_out(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stage = Usd.Stage.CreateNew("blinks.usda")
+    cube = UsdGeom.Cube.Define(stage, "/Cube")
+    for time, token in ((1, "invisible"), (2, "inherited"), (3, "invisible")):
+        cube.CreateVisibilityAttr().Set(token, time)
+    stage.GetRootLayer().Save()
+    assert run(["render", "blinks.usda", "-w", "16", "-f", "1:3", "-o", "b.#.png"]) == ExitCode.OK
+    assert sorted(path.name for path in folder.glob("b.*.png")) == ["b.2.png"]
+    assert "frame 3 is left out" in capsys.readouterr().err
+    assert run(["render", "blinks.usda", "-w", "16", "-f", "1,3", "-o", "c.#.png"]) == ExitCode.USAGE
+
+
+def test_where_no_picture_can_be_written_the_output_is_named(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "file").touch()
+    for name in ("a.png", "a.exr"):
+        assert run(["render", "panes.usda", "-w", "16", "-o", f"file/{name}"]) == ExitCode.TRY_AGAIN
+        assert "--output" in capsys.readouterr().err

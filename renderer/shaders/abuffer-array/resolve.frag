@@ -11,6 +11,7 @@ uniform int slots;
 layout(location = 0) out vec4 out_colour;
 
 void main() {
+    if (gl_HelperInvocation) return;  // beyond the window's edge there are no counts, and the loop would go anywhere
     ivec2 xy = ivec2(gl_FragCoord.xy);
     int p = (xy.y - first_row) * width + xy.x;
     uint base = uint(p) * uint(slots);

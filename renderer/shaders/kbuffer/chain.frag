@@ -24,13 +24,15 @@ void main() {
 #if MIXED
     if (!is_transparent(stored)) discard;
 #endif
+    if (gl_HelperInvocation) return;  // beyond the window's edge there are no offsets, and loops would go anywhere
     const uint64_t empty = packUint2x32(uvec2(0xFFFFFFFFu));
     int p = int(gl_FragCoord.y) * width + int(gl_FragCoord.x);
     uint end = offset[p + 1];
     uint64_t key = packUint2x32(uvec2(pack(stored), floatBitsToUint(v_depth)));
     for (uint i = offset[p]; i < end; ++i) {
-        // A slot only ever falls, so a key read here that is not above ours stays so: the atomic would change nothing.
-        if (slot[i] <= key) continue;
+        // A slot only ever falls, so one whose depth is below ours here stays so: the atomic would change nothing. Only
+        // half of it is compared, since a plain read of 64 bits may see halves of two keys.
+        if (unpackUint2x32(slot[i]).y < unpackUint2x32(key).y) continue;
         uint64_t before = atomicMin(slot[i], key);
         if (before == empty) discard;  // it found a free slot: nothing is left for the tail
         key = max(key, before);

@@ -33,6 +33,7 @@ void main() {
 #if MIXED
     if (!is_transparent(stored)) discard;
 #endif
+    if (gl_HelperInvocation) return;  // beyond the window's edge there are no offsets, and loops would go anywhere
     int p = int(gl_FragCoord.y) * width + int(gl_FragCoord.x);
     uint end = offset[p + 1];
     uint z = floatBitsToUint(v_depth);

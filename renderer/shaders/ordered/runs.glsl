@@ -10,6 +10,7 @@ uniform int first_row;
 
 // First fragment of this pixel, and the one after its last.
 uvec2 run() {
+    if (gl_HelperInvocation) return uvec2(0u);  // beyond the window's edge there are no offsets
     int p = (int(gl_FragCoord.y) - first_row) * width + int(gl_FragCoord.x);
     return uvec2(offset[p], offset[p + 1]);
 }

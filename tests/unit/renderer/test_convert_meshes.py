@@ -207,3 +207,66 @@ def test_what_cannot_be_converted_is_said_so(
         convert_meshes(obj.parent / source, obj.parent / target, **options)  # type: ignore[arg-type]
     assert caught.value.code == (ExitCode.NOT_FOUND if source == "missing.obj" else ExitCode.USAGE)
     assert not (obj.parent / target).exists() or target == "a.obj"
+
+
+@pytest.mark.parametrize(
+    ("face", "x", "words"),
+    [([0, 1, 77], 1.0, "do not exist"), ([0, 1, -2], 1.0, "do not exist"), ([0, 1, 2], 1e39, "huge")],
+)
+def test_what_usd_could_not_hold_is_not_written(tmp_path: Path, face: list[int], x: float, words: str) -> None:
+    source = tmp_path / "odd.obj"
+    source.write_text(f"v 0 0 0\nv {x} 0 0\nv 0 1 0\nf 1 2 3\n")
+    if face != [0, 1, 2]:
+        source = source.with_suffix(".ply")
+        corners = "".join(f"{p}\n" for p in ("0 0 0", "1 0 0", "0 1 0"))
+        head = "".join(f"property float {axis}\n" for axis in "xyz")
+        source.write_text(
+            f"ply\nformat ascii 1.0\nelement vertex 3\n{head}element face 1\n"
+            f"property list uchar int vertex_indices\nend_header\n{corners}3 {face[0]} {face[1]} {face[2]}\n"
+        )
+    with pytest.raises(Problem, match=words):
+        convert_meshes(source, tmp_path / "out.usda")
+    assert not (tmp_path / "out.usda").exists()
+
+
+def test_a_compressed_gltf_is_a_problem(tmp_path: Path) -> None:
+    trimesh.creation.box().export(tmp_path / "a.gltf")
+    document = json.loads((tmp_path / "a.gltf").read_text())
+    document["extensionsRequired"] = ["KHR_draco_mesh_compression"]
+    (tmp_path / "a.gltf").write_text(json.dumps(document))
+    with pytest.raises(Problem, match="KHR_draco_mesh_compression"):
+        convert_meshes(tmp_path / "a.gltf", tmp_path / "out.usda")
+
+
+def test_textures_of_an_obj_may_be_beside_its_folder_and_missing_ones_are_named(tmp_path: Path) -> None:
+    (tmp_path / "model").mkdir()
+    (tmp_path / "images").mkdir()
+    Image.new("RGB", (2, 2), "red").save(tmp_path / "images" / "red.png")
+    (tmp_path / "model" / "a.mtl").write_text(
+        "newmtl red\nmap_Kd ../images/red.png\nnewmtl lost\nmap_Kd ../images/lost.png\n"
+    )
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+    (tmp_path / "model" / "a.obj").write_text(f"mtllib a.mtl\n{corners}usemtl red\nf 1/1 2/2 3/3\n")
+    made = convert_meshes(tmp_path / "model" / "a.obj", tmp_path / "out.usda")
+    assert made.textures == 1
+    assert any("lost.png" in warning for warning in made.warnings)
+
+
+def test_missing_images_of_a_gltf_are_named(tmp_path: Path) -> None:
+    box = trimesh.creation.box()
+    box.visual = trimesh.visual.TextureVisuals(
+        uv=box.vertices[:, :2], material=PBRMaterial(baseColorTexture=Image.new("RGB", (2, 2), "red"))
+    )
+    box.export(tmp_path / "a.gltf")
+    document = json.loads((tmp_path / "a.gltf").read_text())
+    document["images"] = [{"uri": "../gone.png"}]
+    (tmp_path / "a.gltf").write_text(json.dumps(document))
+    assert any("gone.png" in warning for warning in convert_meshes(tmp_path / "a.gltf", tmp_path / "o.usda").warnings)
+
+
+def test_where_nothing_can_be_written_is_a_problem(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(Problem, match="cannot be written") as caught:
+        convert_meshes(tmp_path / "a.obj", tmp_path / "file" / "out.usda")
+    assert caught.value.code == ExitCode.TRY_AGAIN

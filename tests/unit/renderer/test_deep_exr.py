@@ -152,3 +152,14 @@ def test_a_flat_picture_and_a_missing_file_are_no_dumps(tmp_path: Path) -> None:
     with pytest.raises(Problem) as caught:
         read_deep_exr(tmp_path / "missing.exr")
     assert caught.value.code == ExitCode.NOT_FOUND
+
+
+def test_files_that_are_cut_short_or_damaged_are_problems(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    dump = random_dump(4, 4, 6, seed=0)
+    write_deep_exr(tmp_path / "a.exr", dump, solid_behind(dump))
+    data = (tmp_path / "a.exr").read_bytes()
+    for end in rng.integers(0, len(data), 12):
+        (tmp_path / "cut.exr").write_bytes(data[:end])
+        with pytest.raises(Problem, match="cut"):
+            read_deep_exr(tmp_path / "cut.exr")

@@ -11,7 +11,7 @@ import pytest
 from support.scenes import shells
 
 from renderer.exr import camera_attributes, read_exr, write_exr
-from renderer.exr_header import attribute, packed
+from renderer.exr_header import attribute, is_complete, packed
 from schemas.colour import display8
 from schemas.problem import Problem
 from schemas.view import View
@@ -78,3 +78,24 @@ def test_names_that_a_header_cannot_hold_are_refused() -> None:
     assert attribute("a", 1) == b"a\0int\0\x04\0\0\0\x01\0\0\0"
     with pytest.raises(ValueError, match="no name"):
         packed("x" * 32, "int", b"")
+
+
+def test_a_file_that_was_cut_short_is_not_complete(tmp_path: Path) -> None:
+    write_exr(tmp_path / "whole.exr", np.random.default_rng(0).random((40, 30, 3)))
+    data = (tmp_path / "whole.exr").read_bytes()
+    assert is_complete(data, 3)
+    assert not any(is_complete(data[:end], 3) for end in range(len(data)))
+
+
+@pytest.mark.parametrize("reason", ["says nothing", "raises"])
+def test_a_picture_that_the_library_could_not_write_is_an_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reason: str
+) -> None:
+    def write(_file: object, path: str) -> None:
+        Path(path).write_bytes(b"v/1\x01")
+        if reason == "raises":
+            raise RuntimeError("No space left on device.")
+
+    monkeypatch.setattr(OpenEXR.File, "write", write)
+    with pytest.raises(OSError, match=r"No space left"):
+        write_exr(tmp_path / "a.exr", np.zeros((2, 2, 3)))

@@ -246,3 +246,18 @@ def test_a_whole_character_is_what_usdskel_bakes(tmp_path: Path) -> None:
     high = np.max([p.max(axis=0) for p in expected], axis=0)
     np.testing.assert_allclose(scene.bounds + scene.origin, [low, high], atol=1e-5)
     assert np.abs(still.bounds + still.origin - [low, high]).max() > 0.01
+
+
+def test_a_blend_shape_that_does_not_exist_moves_nothing(tmp_path: Path) -> None:
+    scene = load_scene(rig(tmp_path, SHAPES.replace("/Body/Smile>", "/Body/Gone>")), LoadOptions(time=10))
+    assert scene.triangles == 4
+    assert any("/Root/Body/Gone" in line for line in scene.warnings)
+
+
+@pytest.mark.parametrize("first", ["(0,0,0,0)", "(nan,0,0,0)"])
+def test_a_bind_pose_without_an_inverse_is_named_and_poses_nothing(tmp_path: Path, first: str) -> None:
+    file = rig(tmp_path, JOINTS)
+    file.write_text(file.read_text().replace("((1,0,0,0),(0,1,0,0)", f"({first},(0,1,0,0)", 1))
+    scene = load_scene(file, LoadOptions(time=10))
+    assert scene.triangles == 4
+    assert any("no pose" in line and "/Root/Skel" in line for line in scene.warnings)

@@ -1,0 +1,80 @@
+"""Every shader that a technique draws with, as it is compiled, against the language's specification.
+
+Drivers accept more than GLSL 4.50 has, each something else; the Khronos reference compiler accepts what all must.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+
+import moderngl
+import numpy as np
+import pytest
+from support.scenes import VIEW, shells
+from support.training import export_random, random_weights
+
+from renderer import programs
+from renderer.capture import capture
+from renderer.features import derive, gather
+from renderer.frame import Frame
+from renderer.gpu_scene import GpuScene
+from renderer.hidden import hidden_fragments
+from renderer.programs import SHADERS, Defines, expand
+from renderer.techniques import TECHNIQUES, Budget, Needs, technique
+from schemas.tail import MAX_EXPONENT, TAILS
+
+STAGES = (".vert", ".frag", ".comp")
+FULLSCREEN = ("common/fullscreen.vert", "benchmark/empty.frag")
+"""Without defines; the second is the benchmarks'."""
+
+pytestmark = pytest.mark.skipif(
+    shutil.which("glslangValidator") is None, reason="there is no glslangValidator: apt-get install glslang-tools"
+)
+
+
+@pytest.fixture(scope="module")
+def compiled(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
+    """Texts of every shader file, by its name."""
+    texts: dict[str, set[str]] = {name: {expand(name, {})} for name in FULLSCREEN}
+
+    def recorded(name: str, defines: Defines, includes: Mapping[str, str] | None = None) -> str:
+        text = expand(name, defines, includes)
+        texts.setdefault(name, set()).add(text)
+        return text
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(programs, "expand", recorded)
+        frame = Frame(GpuScene(gl, shells(subdivisions=1)), VIEW, 32, 24)
+        dump = capture(frame).dump
+        hidden_fragments(frame)
+        bundle = tmp_path_factory.mktemp("bundle")
+        export_random(bundle, random_weights(4), derive(gather(dump))[dump.counts > 0], gl)
+        needs = Needs(bundle=bundle, allocate=lambda frame, _: np.minimum(frame.count(), 2).astype(np.int32))
+        for name in TECHNIQUES:
+            for tail in TAILS if name == "kbuffer" else TAILS[:1]:
+                technique(name, needs).render(frame, Budget(dump.total // 2, tail, chain="two-pass"))
+    for tail_code in range(-1, len(TAILS)):  # the driver may lack what it needs
+        for surface in ({"TEXTURED": 0, "MIXED": 0}, {"TEXTURED": 1, "MIXED": 1}):
+            defines = {"TAIL": tail_code, "MAX_EXPONENT": MAX_EXPONENT, "WRAPPED": 0, "MORE_UVS": 0, "EMISSIVE": 0}
+            recorded("kbuffer/chain.frag", {**defines, **surface})
+    return texts
+
+
+def test_every_shader_file_is_compiled(compiled: dict[str, set[str]]) -> None:
+    files = {path.relative_to(SHADERS).as_posix() for path in SHADERS.rglob("*") if path.suffix in STAGES}
+    assert set(compiled) == files
+
+
+def test_the_reference_compiler_accepts_every_shader(compiled: dict[str, set[str]], tmp_path: Path) -> None:
+    names = []
+    for name, texts in compiled.items():
+        for number, text in enumerate(sorted(texts)):
+            path = tmp_path / f"{name.replace('/', '-').replace('.', f'-{number}.')}"
+            path.write_text(text, encoding="utf-8")
+            names.append(path.name)
+    done = subprocess.run(["glslangValidator", *names], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-4000:]
+    assert "WARNING" not in done.stdout, done.stdout[-4000:]

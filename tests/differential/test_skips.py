@@ -1,0 +1,63 @@
+"""What is skipped changes nothing: each picture again by the longer way, bit for bit."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+import pytest
+from support.scenes import SIZE, VIEW, shells
+from support.training import random_weights
+
+from renderer.allocation.fill import solve_lambda
+from renderer.capture import capture
+from renderer.features import derive, gather
+from renderer.frame import Frame
+from renderer.gpu_scene import GpuScene
+from renderer.techniques import TECHNIQUES, Budget, KBufferOptimal, technique
+from renderer.techniques.skips import EMPTY_TILES, TAIL
+from schemas.fragments import FragmentDump
+
+COUNTING = [
+    name for name in TECHNIQUES if name not in ("kbuffer-deep", "kbuffer-optimal", "weighted-average", "stochastic")
+]
+
+
+@pytest.fixture(scope="module")
+def odd(gl: moderngl.Context) -> Frame:
+    """A window that is no whole number of tiles, many of them empty."""
+    return Frame(GpuScene(gl, shells()), VIEW, SIZE[0] + 5, SIZE[1] - 3)
+
+
+@pytest.mark.parametrize("name", COUNTING)
+def test_empty_tiles_are_the_background(odd: Frame, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    odd.count()
+    tiled = technique(name).render(odd, Budget(3 * odd.pixels))
+    assert tiled.skips[EMPTY_TILES] > 10
+    monkeypatch.setattr(Frame, "counted", False)
+    whole = technique(name).render(odd, Budget(3 * odd.pixels))
+    assert whole.skips[EMPTY_TILES] == 0
+    assert np.array_equal(tiled.linear, whole.linear)
+
+
+def test_pixels_that_need_no_tail_are_the_same_with_one(frame: Frame, dump: FragmentDump) -> None:
+    n = dump.counts.astype(np.int32)
+    fullest = int(np.argmax(n))
+    less = n.copy()
+    less[fullest] -= 1
+    without, with_tail = (KBufferOptimal(lambda *_, k=k: k).render(frame, Budget(0)) for k in (n, less))
+    assert (without.skips[TAIL], with_tail.skips[TAIL]) == (1, 0)
+    differs = (without.linear != with_tail.linear).any(axis=2).ravel()
+    assert not np.delete(differs, fullest).any()
+
+
+def test_settled_pixels_have_no_part_in_the_choice_of_lambda(gl: moderngl.Context) -> None:
+    dump = capture(Frame(GpuScene(gl, shells(layers=3)), VIEW, *SIZE)).dump
+    n = dump.counts
+    occupied, opened = np.flatnonzero(n > 0), np.flatnonzero(n > 1)
+    assert len(opened) < len(occupied)
+    a, b = random_weights(4).predict(derive(gather(dump)))
+    for budget in (len(occupied), dump.total // 2, dump.total - 1):
+        every, _ = solve_lambda(a[occupied], b[occupied], n[occupied], budget, 1)
+        left = budget - (len(occupied) - len(opened))
+        some, _ = solve_lambda(a[opened], b[opened], n[opened], left, 1)
+        assert np.array_equal(every[n[occupied] > 1], some)
