@@ -182,6 +182,12 @@ class Frame:
         self.gpu.draw(fragment, TRANSPARENT, {**self.uniforms, **uniforms}, defines, ranked, self._visible)
         self.ctx.enable_only(moderngl.NOTHING)
 
+    def zero(self, texture: moderngl.Texture) -> None:
+        """Clear a texture of the frame's size to zero, all of it: what is bound last may have left a scissor."""
+        target = self.ctx.framebuffer([texture])
+        target.use()
+        target.clear(0.0, 0.0, 0.0, 0.0)
+
     def buffer(self, words: int, fill: int) -> moderngl.Buffer:
         """A storage buffer of uint32, every word set to `fill`.
 
@@ -256,7 +262,7 @@ class Frame:
             gathered.nearest_facing.bind_to_storage_buffer(NEAREST_FACING)
         for texture in made.values():
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-            self.ctx.framebuffer([texture]).clear(0.0, 0.0, 0.0, 0.0)
+            self.zero(texture)
         # Each sum that is there has the next colour attachment.
         places = {f"SUMS{texel}": place for place, texel in enumerate(blended) if texel}
         self.draw_transparent(

@@ -153,7 +153,7 @@ def _draw_with_tail(frame: Frame, fragment: str, tail: _Tail) -> list[moderngl.T
     if tail.code != _NO_TAIL:
         tails = [frame.ctx.texture((frame.width, frame.height), 4, dtype="f4") for _ in range(2)]
         for texture in tails:
-            frame.ctx.framebuffer([texture]).clear(0.0, 0.0, 0.0, 0.0)
+            frame.zero(texture)
         _, z_min, z_max = frame.depth_range()
         z_min.bind_to_storage_buffer(_Z_MIN)
         z_max.bind_to_storage_buffer(_Z_MAX)

@@ -18,7 +18,7 @@ def float_targets(frame: Frame, *components: int) -> list[moderngl.Texture]:
     made = [frame.ctx.texture((frame.width, frame.height), count, dtype="f4") for count in components]
     for texture in made:
         texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        frame.ctx.framebuffer([texture]).clear(0.0, 0.0, 0.0, 0.0)
+        frame.zero(texture)
     return made
 
 

@@ -1,7 +1,8 @@
 """Takes uploads in, each in a process of its own, and watches what they touch: `runner.py CASES.json`.
 
 One JSON line for each case: `slug` of the problem or None, `message`, `facts`, `opened` (names in the canary folders
-that were opened), `connected` (whether anybody came to the port), `seconds`, and `ended`, the exit status.
+that were opened), `connected` (whether anybody came to the port), `seconds`, and `ended`, the exit status. Compiled
+kernels are kept in NUMBA_CACHE_DIR, as for the workers' children.
 """
 
 from __future__ import annotations
@@ -64,7 +65,7 @@ def take_in(case: dict[str, Any], write: Path) -> dict[str, Any]:
     """
     folder = Path(case["folder"])
     if case["mode"] in ("whole", "stage"):
-        report = enter([folder], [write], MEMORY, FILE)
+        report = enter([folder], [write, Path(os.environ["NUMBA_CACHE_DIR"])], MEMORY, FILE)
         if report.missing:
             return {"slug": "no-sandbox", "message": ", ".join(report.missing)}
     try:

@@ -120,7 +120,10 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Results]:
     file = home / "cases.json"
     file.write_text(json.dumps({"cases": cases, "watched": list(map(str, watched)), "port": make.PORT}))
     # One thread: a fork has one, and all that a process had before it is shut in is shut in.
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PXR_WORK_THREAD_LIMIT": "1"}
+    kernels = home / "numba"
+    kernels.mkdir()
+    threads = {"OPENBLAS_NUM_THREADS": "1", "PXR_WORK_THREAD_LIMIT": "1"}
+    environment = {**os.environ, **threads, "NUMBA_CACHE_DIR": str(kernels)}
     done = subprocess.run(
         [sys.executable, str(HERE / "runner.py"), str(file)], capture_output=True, text=True, env=environment
     )

@@ -39,11 +39,13 @@ def test_scenes_that_hold_all_they_need_are_accepted(tmp_path: Path) -> None:
         for folder, root in _roots()
     ]
     (tmp_path / "cases.json").write_text(json.dumps({"cases": cases, "watched": [], "port": make.PORT + 1}))
+    kernels = tmp_path / "numba"
+    kernels.mkdir()
     done = subprocess.run(
         [sys.executable, str(HERE / "runner.py"), str(tmp_path / "cases.json")],
         capture_output=True,
         text=True,
-        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "NUMBA_CACHE_DIR": str(kernels)},
     )
     lines: list[dict[str, Any]] = [json.loads(line) for line in done.stdout.splitlines()]
     assert len(lines) == len(cases) > 20, done.stderr

@@ -108,6 +108,13 @@ def test_triangles_outside_the_frustum_are_left_out_and_the_dump_stays_the_same(
     _assert_same(capture(whole).dump, capture(culled).dump)
 
 
+def test_a_cleared_texture_is_zero_everywhere_after_a_pass_over_some_rows(ctx: moderngl.Context, frame: Frame) -> None:
+    texture = ctx.texture(SIZE, 4, data=np.ones(4 * frame.pixels, dtype=np.float32).tobytes(), dtype="f4")
+    frame.draw_transparent("hidden/hidden.frag", frame.target([]), scissor=(3, 5))
+    frame.zero(texture)
+    assert not np.frombuffer(texture.read(), dtype=np.float32).any()
+
+
 def test_hidden_fragments_are_those_that_only_the_opaque_depth_removes(ctx: moderngl.Context, frame: Frame) -> None:
     scene = shells()
     glass = [batch for batch in scene.batches if batch.layer != "opaque"]
