@@ -182,6 +182,14 @@ class Frame:
         self.gpu.draw(fragment, TRANSPARENT, {**self.uniforms, **uniforms}, defines, ranked, self._visible)
         self.ctx.enable_only(moderngl.NOTHING)
 
+    def float_targets(self, *components: int) -> list[moderngl.Texture]:
+        """Float32 textures of the frame's size, zero, one for each number of components."""
+        made = [self.ctx.texture((self.width, self.height), count, dtype="f4") for count in components]
+        for texture in made:
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            self.zero(texture)
+        return made
+
     def zero(self, texture: moderngl.Texture) -> None:
         """Clear a texture of the frame's size to zero, all of it: what is bound last may have left a scissor."""
         target = self.ctx.framebuffer([texture])
@@ -251,7 +259,7 @@ class Frame:
 
     def _gather(self, what: Gather, texels: frozenset[int], z_min: moderngl.Buffer, z_max: moderngl.Buffer) -> Gathered:
         blended = sorted(texels - {NEAREST})
-        made = {texel: self.ctx.texture((self.width, self.height), 4, dtype="f4") for texel in blended}
+        made = dict(zip(blended, self.float_targets(*[4] * len(blended)), strict=True))
         gathered = Gathered(what, [made.get(texel, made[0]) for texel in range(NEAREST)])
         z_min.bind_to_storage_buffer(Z_MIN)
         z_max.bind_to_storage_buffer(Z_MAX)
@@ -260,9 +268,6 @@ class Frame:
             gathered.nearest_facing = self.buffer(self.pixels, 0)
             gathered.nearest_colour.bind_to_storage_buffer(NEAREST_COLOUR)
             gathered.nearest_facing.bind_to_storage_buffer(NEAREST_FACING)
-        for texture in made.values():
-            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-            self.zero(texture)
         # Each sum that is there has the next colour attachment.
         places = {f"SUMS{texel}": place for place, texel in enumerate(blended) if texel}
         self.draw_transparent(

@@ -13,7 +13,7 @@ the last bits of the one-pass tail may differ from run to run there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import moderngl
 import numpy as np
@@ -24,7 +24,7 @@ from renderer.csr import offsets_of
 from renderer.frame import Clock, Frame, Gathered
 from renderer.screen import TURNS, read_linear, resolve_screen
 from renderer.techniques.base import Budget, Rendered
-from renderer.techniques.skips import TAIL, frame_skips
+from renderer.techniques.skips import PREDICTOR, TAIL, frame_skips
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 from schemas.tail import MAX_EXPONENT, TailName
@@ -106,6 +106,20 @@ def render_chain(
     )
 
 
+def render_complete(frame: Frame, n: NDArray[np.integer], budget: Budget) -> Rendered | None:
+    """The exact picture where a budget holds every fragment, so that nothing has to choose slots; else None.
+
+    Args:
+        frame: The view.
+        n: int [P], fragments of each pixel.
+        budget: As `render_chain` has it.
+    """
+    if budget.fragments < int(n.sum(dtype=np.int64)):
+        return None
+    rendered = render_chain(frame, n, n, budget)
+    return replace(rendered, skips={**rendered.skips, PREDICTOR: 1})
+
+
 def _bytes_a_pixel(gathered: Gathered | None, complete: bool) -> int:
     """Offsets, n and depth range, the tail's two targets, and what the gather pass left alive."""
     return 4 + 12 + (0 if complete else 2 * 16) + (0 if gathered is None else gathered.pixel_bytes)
@@ -151,9 +165,7 @@ def _draw_with_tail(frame: Frame, fragment: str, tail: _Tail) -> list[moderngl.T
     """Draw into the bound slots; the two targets that hold the tail's sums, or none."""
     tails: list[moderngl.Texture] = []
     if tail.code != _NO_TAIL:
-        tails = [frame.ctx.texture((frame.width, frame.height), 4, dtype="f4") for _ in range(2)]
-        for texture in tails:
-            frame.zero(texture)
+        tails = frame.float_targets(4, 4)
         _, z_min, z_max = frame.depth_range()
         z_min.bind_to_storage_buffer(_Z_MIN)
         z_max.bind_to_storage_buffer(_Z_MAX)

@@ -16,8 +16,8 @@ from renderer.frame import ALL_TEXELS, Clock, Frame
 from renderer.gpu_scene import set_uniforms
 from renderer.onnx_network import OnnxNetwork
 from renderer.techniques.base import Budget, Rendered
-from renderer.techniques.chain import render_chain
-from renderer.techniques.skips import PREDICTOR, SETTLED_PIXELS, UNREAD_SUMS
+from renderer.techniques.chain import render_chain, render_complete
+from renderer.techniques.skips import SETTLED_PIXELS, UNREAD_SUMS
 from schemas.bundle import GLSL, ONNX, load_manifest
 from schemas.limits import LIMITS
 
@@ -54,9 +54,9 @@ class KBufferDeep:
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame with predicted slots; the budget is met exactly where it is below N."""
         n = frame.count()
-        if budget.fragments >= int(n.sum(dtype=np.int64)):
-            rendered = render_chain(frame, n, n, budget)
-            return replace(rendered, skips={**rendered.skips, PREDICTOR: 1})
+        complete = render_complete(frame, n, budget)
+        if complete is not None:
+            return complete
         gathered = frame.gather("gather", self._texels)
         clock = Clock(frame.ctx)
         slots, settled = self._allocate(frame, n, budget.fragments, clock)

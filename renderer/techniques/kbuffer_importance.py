@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from renderer.allocation.fill import budget_fill, feasible_k_min
 from renderer.allocation.importance import VkbOptions, vkb_importance
 from renderer.frame import Clock, Frame
 from renderer.techniques.base import Budget, Rendered
-from renderer.techniques.chain import render_chain
-from renderer.techniques.skips import PREDICTOR
+from renderer.techniques.chain import render_chain, render_complete
 
 
 class KBufferImportance:
@@ -29,9 +26,9 @@ class KBufferImportance:
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame with slots by importance; none is computed where the budget holds every fragment."""
         n = frame.count()
-        if budget.fragments >= int(n.sum(dtype=np.int64)):
-            rendered = render_chain(frame, n, n, budget)
-            return replace(rendered, skips={**rendered.skips, PREDICTOR: 1})
+        complete = render_complete(frame, n, budget)
+        if complete is not None:
+            return complete
         gathered = frame.gather("gather-nearest")
         assert gathered.nearest_facing is not None, "this gather has the nearest fragment"
         clock = Clock(frame.ctx)

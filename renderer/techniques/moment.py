@@ -6,7 +6,7 @@ import moderngl
 
 from renderer.frame import Clock, Frame
 from renderer.techniques.base import Budget, Rendered
-from renderer.techniques.sums import float_targets, rendered, resolve_mean
+from renderer.techniques.sums import rendered, resolve_mean
 from schemas.problem import Problem
 from schemas.tail import MAX_EXPONENT
 
@@ -78,10 +78,10 @@ class Moment:
         frame.count()
         clock = Clock(frame.ctx)
         with clock.measure("moments"):
-            totals, moments = float_targets(frame, 1, 4)
+            totals, moments = frame.float_targets(1, 4)
             self._draw(frame, "moment/moments.frag", [totals, moments])
         with clock.measure("blend"):
-            (colours,) = float_targets(frame, 4)
+            (colours,) = frame.float_targets(4)
             for unit, texture in enumerate((totals, moments)):
                 texture.use(unit)
             self._draw(frame, "moment/blend.frag", [colours])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from renderer.frame import Clock, Frame
 from renderer.techniques.base import Budget, Rendered
-from renderer.techniques.sums import float_targets, rendered, resolve_mean
+from renderer.techniques.sums import rendered, resolve_mean
 from schemas.limits import LIMITS
 from schemas.problem import Problem
 
@@ -64,7 +64,7 @@ class Stochastic:
         samples.bind_to_storage_buffer(0)
         defines = {"SAMPLES": self._samples}
         clock = Clock(frame.ctx)
-        colours, depths = float_targets(frame, 4, 1)
+        colours, depths = frame.float_targets(4, 1)
         for first in range(0, frame.height, rows):
             band = first, min(rows, frame.height - first)
             with clock.measure("samples"):

@@ -1,4 +1,4 @@
-"""What the techniques that blend all fragments into sums share: float targets, the mean they resolve to, accounts."""
+"""What the techniques that blend all fragments into sums share: the mean they resolve to, accounts."""
 
 from __future__ import annotations
 
@@ -11,15 +11,6 @@ from renderer.frame import Clock, Frame
 from renderer.screen import read_linear, resolve_screen
 from renderer.techniques.base import Rendered
 from renderer.techniques.skips import frame_skips
-
-
-def float_targets(frame: Frame, *components: int) -> list[moderngl.Texture]:
-    """Float32 textures of the frame's size, zero, one for each number of components."""
-    made = [frame.ctx.texture((frame.width, frame.height), count, dtype="f4") for count in components]
-    for texture in made:
-        texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        frame.zero(texture)
-    return made
 
 
 def resolve_mean(frame: Frame, colours: moderngl.Texture, depths: moderngl.Texture) -> moderngl.Texture:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from renderer.frame import Clock, Frame
 from renderer.screen import resolve_screen
 from renderer.techniques.base import Budget, Rendered
-from renderer.techniques.sums import float_targets, rendered
+from renderer.techniques.sums import rendered
 
 _PIXEL_BYTES = 16 + 4
 """Sums of colour and alpha, count."""
@@ -27,7 +27,7 @@ class WeightedAverage:
         """Render a frame. `budget` is not used: the sums take the same memory whatever n is."""
         clock = Clock(frame.ctx)
         with clock.measure("sums"):
-            targets = float_targets(frame, 4, 1)
+            targets = frame.float_targets(4, 1)
             frame.draw_transparent("weighted-average/sums.frag", frame.target(targets))
         with clock.measure("resolve"):
             image = resolve_screen(frame, "weighted-average/resolve.frag", [frame.background, *targets])

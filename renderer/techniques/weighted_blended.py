@@ -6,7 +6,7 @@ from typing import Literal
 
 from renderer.frame import Clock, Frame
 from renderer.techniques.base import Budget, Rendered
-from renderer.techniques.sums import float_targets, rendered, resolve_mean
+from renderer.techniques.sums import rendered, resolve_mean
 
 Equation = Literal[7, 8, 9, 10]
 """A weight of the paper, by the number of its equation."""
@@ -51,7 +51,7 @@ class WeightedBlended:
         near, far = frame.view.clip_range(frame.gpu.scene.bounds)
         clock = Clock(frame.ctx)
         with clock.measure("sums"):
-            colours, depths = float_targets(frame, 4, 1)
+            colours, depths = frame.float_targets(4, 1)
             frame.draw_transparent(
                 "weighted-blended/sums.frag",
                 frame.target([colours, depths]),
