@@ -21,9 +21,9 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
-from labeller.allocate import allocate
 from labeller.curves import Curves
 from labeller.hull import Hulls
+from labeller.rules import allocate_curves
 from renderer.features import derive, gather
 from schemas.fragments import FragmentDump
 from schemas.problem import ExitCode, Problem
@@ -246,7 +246,7 @@ def _levels(dump: FragmentDump, curves: Curves, hulls: Hulls, budgets: Sequence[
             error=found.error,
             bound=found.bound or 0.0,
         )
-        for found in allocate(dump, curves, short, "optimal", hulls)
+        for found in allocate_curves(dump, curves, short, "optimal", hulls)
     )
 
 

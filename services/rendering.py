@@ -269,13 +269,13 @@ def path_of(options: RenderOptions, job: _Job, name: str) -> Path:
 
 def optimal(frame: Frame, budget: Budget) -> NDArray[np.int32]:
     """The certified optimum for a frame, int32 [P]; see `renderer.techniques.kbuffer_optimal.Allocate`."""
-    from labeller.allocate import allocate
     from labeller.curves import error_curves
+    from labeller.rules import allocate_curves
     from renderer.capture import capture
 
     dump = capture(frame).dump
     curves = error_curves(dump, budget.tail, budget.g, "display")
-    return allocate(dump, curves, [budget.fragments], "optimal")[0].k
+    return allocate_curves(dump, curves, [budget.fragments], "optimal")[0].k
 
 
 @contextmanager

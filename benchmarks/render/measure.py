@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.render.setup import Subject, in_turns
-from labeller.allocate import allocate
 from labeller.curves import error_curves
+from labeller.rules import allocate_curves
 from renderer import metrics
 from renderer.capture import capture
 from renderer.fragment_list import KEY_BYTES, PLACE_BYTES
@@ -117,7 +117,7 @@ def every_technique(subject: Subject, bundle: Path | None, rounds: int, names: l
     view = subject.views[0]
     dump = capture(Frame(subject.gpu, view, *SIZE)).dump
     budget = Budget(FACTOR * dump.pixels)
-    optimum = allocate(dump, error_curves(dump), [budget.fragments], "optimal")[0].k
+    optimum = allocate_curves(dump, error_curves(dump), [budget.fragments], "optimal")[0].k
     needs = Needs(bundle=bundle, allocate=lambda *_: np.asarray(optimum, dtype=np.int32))
     exact = display8(technique("sbuffer").render(Frame(subject.gpu, view, *SIZE), budget).linear)
     rows = []

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from safetensors.numpy import load_file, save_file
 
-from labeller.allocate import allocate
 from labeller.allocation import RULES, Allocation
 from labeller.curves import error_curves
 from labeller.hull import lower_hulls
+from labeller.rules import allocate_curves
 from labeller.shards import write_shard
 from renderer.dump import read_dump
 from services.stages.desk import SHARD, Desk, save_facts
@@ -39,7 +39,7 @@ def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
     curves = error_curves(dump, params["tail"], params["g"], params["metric"])
     hulls = lower_hulls(curves, 1)
     report(0.3, f"curves of {dump.total:,} fragments")
-    made = {rule: allocate(dump, curves, budgets, rule, hulls=hulls) for rule in RULES}
+    made = {rule: allocate_curves(dump, curves, budgets, rule, hulls=hulls) for rule in RULES}
     # k rarely exceeds 255, never 65535 at any budget that is not exact; 16 bits halve the artifact.
     save_file(
         {str(a.budget): np.minimum(a.k, 65535).astype(np.uint16) for a in made["optimal"] if not a.exact} or _NOTHING,

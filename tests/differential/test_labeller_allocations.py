@@ -13,8 +13,8 @@ from support.curves import curves_of, dump_for, split
 from support.dumps import random_dump
 
 from labeller import reference
-from labeller.allocate import allocate
 from labeller.curves import error_curves
+from labeller.rules import allocate_curves
 from schemas.tail import TailName
 
 
@@ -39,7 +39,7 @@ def test_selection_removes_what_the_heap_removes_ties_included(lists: list[list[
     total = int(curves.counts.sum())
     budget = data.draw(st.integers(0, total))
     for rule, key in (("greedy", "absolute"), ("increment", "increment")):
-        (found,) = allocate(dump_for(curves), curves, [budget], rule)
+        (found,) = allocate_curves(dump_for(curves), curves, [budget], rule)
         assert found.k.tolist() == reference.heap_removal(split(curves), budget, found.k_min, key)
 
 
@@ -50,14 +50,14 @@ def test_selection_removes_what_the_heap_removes_on_a_view(tail: TailName) -> No
     occupied = int(np.count_nonzero(dump.counts))
     budgets = [0, 100, occupied - 1, occupied, dump.total // 2, dump.total - 1]
     for rule, key in (("greedy", "absolute"), ("increment", "increment")):
-        for found in allocate(dump, curves, budgets, rule):
+        for found in allocate_curves(dump, curves, budgets, rule):
             heap = reference.heap_removal(split(curves), found.budget, found.k_min, key)
             assert np.array_equal(found.k, heap), (rule, found.budget)
 
 
 def check_certificate(lists: list[list[float]], budget: int) -> None:
     curves = curves_of(lists)
-    (found,) = allocate(dump_for(curves), curves, [budget], "optimal")
+    (found,) = allocate_curves(dump_for(curves), curves, [budget], "optimal")
     best = reference.optimum(split(curves), budget, found.k_min)
     assert found.bound is not None
     assert found.gap is not None
@@ -86,6 +86,6 @@ def test_views_of_some_hundred_pixels_are_optimal_to_a_thousandth() -> None:
     dump = random_dump(20, 15, 8, seed=2)
     curves = error_curves(dump)
     for share in (0.25, 0.4, 0.6):
-        (found,) = allocate(dump, curves, [int(share * dump.total)], "optimal")
+        (found,) = allocate_curves(dump, curves, [int(share * dump.total)], "optimal")
         best = reference.optimum(split(curves), found.budget, found.k_min)
         assert best * (1 - 1e-12) <= found.error <= best * 1.001

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.dumps import random_dump
 
-from labeller.allocate import allocate
 from labeller.allocation import RULES, RuleName
 from labeller.curves import error_curves
 from labeller.hull import lower_hulls
+from labeller.rules import allocate_curves
 from schemas.fragments import FragmentDump
 from schemas.tail import METRICS, TAILS, MetricName, TailName
 
@@ -50,7 +50,7 @@ def test_every_allocation_keeps_its_limits(
     dump: FragmentDump, rule: RuleName, tail: TailName, metric: MetricName
 ) -> None:
     curves = error_curves(dump, tail, metric=metric)
-    for found in allocate(dump, curves, budgets_of(dump), rule):
+    for found in allocate_curves(dump, curves, budgets_of(dump), rule):
         assert found.used == found.k.sum() <= found.budget
         assert (found.k <= dump.counts).all()
         assert found.k.min(initial=0) >= 0
@@ -67,9 +67,9 @@ def test_every_allocation_keeps_its_limits(
 @given(dumps, st.sampled_from(TAILS))
 def test_nothing_is_better_than_optimal_and_nothing_beats_its_bound(dump: FragmentDump, tail: TailName) -> None:
     curves, budgets = error_curves(dump, tail), budgets_of(dump)
-    optimal = allocate(dump, curves, budgets, "optimal")
+    optimal = allocate_curves(dump, curves, budgets, "optimal")
     for rule in RULES:
-        for best, other in zip(optimal, allocate(dump, curves, budgets, rule), strict=True):
+        for best, other in zip(optimal, allocate_curves(dump, curves, budgets, rule), strict=True):
             assert best.bound <= best.error
             if rule in ("greedy", "increment"):
                 assert best.error <= other.error * (1 + 1e-6)
@@ -81,7 +81,7 @@ def test_nothing_is_better_than_optimal_and_nothing_beats_its_bound(dump: Fragme
 @given(dumps)
 def test_the_bound_does_not_rise_with_the_budget(dump: FragmentDump) -> None:
     curves = error_curves(dump)
-    found = allocate(dump, curves, budgets_of(dump), "optimal")
+    found = allocate_curves(dump, curves, budgets_of(dump), "optimal")
     for k_min in (0, 1):
         bounds = np.array([x.bound for x in found if x.k_min == k_min])
         assert (np.diff(bounds) <= 1e-12 * bounds[:-1]).all() if len(bounds) else True
@@ -114,9 +114,9 @@ def test_the_error_does_not_rise_with_the_budget_on_a_view() -> None:
     occupied = int(np.count_nonzero(dump.counts))
     budgets = np.linspace(occupied, dump.total, 25).astype(int).tolist()
     for rule in ("greedy", "optimal"):
-        errors = np.array([x.error for x in allocate(dump, curves, budgets, rule)])
+        errors = np.array([x.error for x in allocate_curves(dump, curves, budgets, rule)])
         assert (np.diff(errors) <= 1e-4 * errors[:-1]).all(), rule
-    assert max(x.gap for x in allocate(dump, curves, budgets[:-1], "optimal")) < 1e-3
+    assert max(x.gap for x in allocate_curves(dump, curves, budgets[:-1], "optimal")) < 1e-3
 
 
 @pytest.mark.parametrize("alpha", [1 / 255, 0.5, 254 / 255])
@@ -124,6 +124,6 @@ def test_lists_of_thousands_keep_the_limits(alpha: float) -> None:
     dump = random_dump(2, 2, 4096, seed=1, alpha=alpha)
     curves = error_curves(dump)
     for rule in RULES:
-        (found,) = allocate(dump, curves, [dump.total // 2], rule)
+        (found,) = allocate_curves(dump, curves, [dump.total // 2], rule)
         assert found.used <= found.budget
         assert np.isfinite(found.error)

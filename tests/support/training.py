@@ -10,9 +10,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from labeller.allocate import allocate
 from labeller.curves import error_curves
 from labeller.hull import lower_hulls
+from labeller.rules import allocate_curves
 from renderer.features import FEATURES, derive, gather
 from schemas.bundle import Provenance, TailSpec
 from support.dumps import random_dump
@@ -27,7 +27,7 @@ def random_view(asset: str, seed: int, size: int = 40, max_n: int = 12) -> ViewD
     curves = error_curves(dump)
     hulls = lower_hulls(curves, 1)
     budgets = [dump.total // 4, dump.total // 2]
-    prices = [math.log(found.lam or 1e-9) for found in allocate(dump, curves, budgets, "optimal", hulls)]
+    prices = [math.log(found.lam or 1e-9) for found in allocate_curves(dump, curves, budgets, "optimal", hulls)]
     rows = np.flatnonzero(dump.counts > 1)
     sizes = np.diff(hulls.offsets)[rows]
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)

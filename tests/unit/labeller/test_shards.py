@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from support.dumps import random_dump
 
-from labeller.allocate import allocate
 from labeller.curves import error_curves
 from labeller.hull import lower_hulls
+from labeller.rules import allocate_curves
 from labeller.shards import Shard, read_shard, stratified_sample, write_shard
 from renderer.features import FEATURES, derive, gather
 from schemas.problem import Problem
@@ -58,7 +58,7 @@ def test_levels_are_those_of_the_optimum(shard: Shard) -> None:
     assert [x.budget for x in shard.meta.levels] == sorted({x.budget for x in shard.meta.levels})
     assert [x.budget for x in shard.meta.levels if x.scored] == [b for b in BUDGETS if b < DUMP.total]
     for level in shard.meta.levels:
-        (found,) = allocate(DUMP, CURVES, [level.budget], "optimal")
+        (found,) = allocate_curves(DUMP, CURVES, [level.budget], "optimal")
         assert (level.error, level.bound, level.k_min) == (found.error, found.bound, found.k_min)
         assert level.log_lambda == (math.log(found.lam) if found.lam else None)
     low, high = shard.price_range

@@ -22,7 +22,7 @@ from schemas.fragments import FragmentDump
 _VKB: Final = VkbOptions()
 
 
-def allocate(
+def allocate_curves(
     dump: FragmentDump,
     curves: Curves,
     budgets: Sequence[int],
@@ -30,6 +30,7 @@ def allocate(
     hulls: Hulls | None = None,
     vkb: VkbOptions = _VKB,
     fill: FillName = "exact",
+    k_min: int = 1,
 ) -> list[Allocation]:
     """Core fragments of every pixel, for each budget. Budgets share everything that does not depend on them.
 
@@ -41,6 +42,7 @@ def allocate(
         hulls: The curves' hulls, if the caller has them (rule `optimal`); made here for another k_min.
         vkb: Factors of rule `importance`.
         fill: How the rules `importance`, `uniform` and `proportional` come from weights to counts.
+        k_min: Fewest fragments of an occupied pixel: 1 (or 0, where a budget does not cover that), or always 0.
 
     Returns:
         One allocation for each budget, in the order of `budgets`.
@@ -54,13 +56,13 @@ def allocate(
     makers: dict[int, Callable[[int], Allocation]] = {}
     results = []
     for budget in budgets:
-        k_min = feasible_k_min(n, budget)
+        least = min(k_min, feasible_k_min(n, budget))
         if budget >= dump.total:
-            results.append(_everything(rule, budget, n, k_min))
+            results.append(_everything(rule, budget, n, least))
             continue
-        if k_min not in makers:
-            makers[k_min] = _maker(dump, curves, rule, k_min, hulls, vkb, fill)
-        results.append(makers[k_min](budget))
+        if least not in makers:
+            makers[least] = _maker(dump, curves, rule, least, hulls, vkb, fill)
+        results.append(makers[least](budget))
     return results
 
 
