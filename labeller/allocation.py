@@ -30,6 +30,7 @@ class Allocation:
         bound: Lower bound of the error of any allocation within the budget (rule `optimal`).
         gap: `(error - bound) / error`, 0 where the error is 0 (rule `optimal`).
         lam: Error saved per fragment at which the budget was used up (rule `optimal`); 0 if it was not.
+        proven: Whether no allocation within the budget has less error: the bound is the error itself (rule `optimal`).
     """
 
     rule: RuleName
@@ -42,6 +43,7 @@ class Allocation:
     bound: float | None = None
     gap: float | None = None
     lam: float | None = None
+    proven: bool = False
 
 
 def measured(rule: RuleName, budget: int, k: NDArray[np.int32], curves: Curves, k_min: int) -> Allocation:

@@ -7,75 +7,125 @@ so the first R removals are those below one threshold, plus ties by pixel index:
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Callable, Iterable, Sequence
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
 from labeller.curves import Curves
-from labeller.selection import LAST_KEY, Selector, ascending_keys
+from labeller.selection import LAST_KEY, Histogram, Threshold, ascending_keys
+
+RemovalName = Literal["greedy", "increment"]
+_NO_WEIGHTS = np.empty(0, dtype=np.int32)
+
+
+class RemovalKeys(NamedTuple):
+    """Keys of all removals of consecutive pixels; entry `offsets[p] + k - 1` is for the one that leaves k - 1.
+
+    Attributes:
+        offsets: int64 [P+1].
+        keys: uint32 [N], not rising within a pixel; `LAST_KEY` where k_min forbids the removal.
+    """
+
+    offsets: NDArray[np.int64]
+    keys: NDArray[np.uint32]
+
+
+def removal_keys(curves: Curves, k_min: int, key: RemovalName) -> RemovalKeys:
+    """The order in which the fragments of some pixels are removed.
+
+    Args:
+        curves: Error curves of the pixels.
+        k_min: 0 or 1; no pixel goes below `min(k_min, n)`.
+        key: `greedy`: the error after the removal, as Algorithm 1 is printed; `increment`: by how much it grows.
+    """
+    offsets = curves.offsets - np.arange(len(curves.offsets))
+    values = np.empty(offsets[-1], dtype=np.float32)
+    _running_maxima(offsets, curves.error, k_min, key == "increment", values)
+    keys = ascending_keys(values)
+    _forbid(offsets, k_min, keys)
+    return RemovalKeys(offsets, keys)
 
 
 class Removals:
     """The removal order of all fragments of a view, for any number of budgets.
 
     Args:
-        curves: Error curves of the view.
-        k_min: 0 or 1; no pixel goes below `min(k_min, n)`.
-        key: `greedy`: the error after the removal, as Algorithm 1 is printed; `increment`: by how much it grows.
+        parts: Gives the keys of the view's pixels, in one part or in several one after the other; called anew for
+            each pass.
     """
 
-    def __init__(self, curves: Curves, k_min: int, key: Literal["greedy", "increment"]) -> None:
-        self._offsets = curves.offsets - np.arange(len(curves.offsets))
-        values = np.empty(self._offsets[-1], dtype=np.float32)
-        _running_maxima(self._offsets, curves.error, k_min, key == "increment", values)
-        keys = ascending_keys(values)
-        keys[np.isinf(values)] = LAST_KEY
-        self._selector = Selector(keys)
+    def __init__(self, parts: Callable[[], Iterable[RemovalKeys]]) -> None:
+        self._parts = parts
+        self._histogram = Histogram((part.keys, _NO_WEIGHTS) for part in parts())
 
-    def keep(self, budget: int) -> NDArray[np.int32]:
-        """int32 [P], k once no more than `budget` fragments are left; equal to the literal heap, ties included."""
-        target = max(len(self._selector.keys) - budget, 0)
-        end = self._selector.threshold(target)
-        above, tied = _split(self._offsets, self._selector.keys, end.key)
-        before = np.cumsum(tied, dtype=np.int64) - tied
-        removed = np.clip(target - end.below - before, 0, tied)
-        return np.asarray(above + tied - removed, dtype=np.int32)
+    def keep(self, budgets: Sequence[int]) -> list[NDArray[np.int32]]:
+        """int32 [P] for each budget, k once no more fragments are left; equal to the literal heap, ties included."""
+        targets = [max(self._histogram.total - budget, 0) for budget in budgets]
+        items = ((part.keys, _NO_WEIGHTS) for part in self._parts())
+        ends = self._histogram.thresholds(targets, items)
+        left = [target - end.below for target, end in zip(targets, ends, strict=True)]
+        kept: list[list[NDArray[np.int32]]] = [[] for _ in budgets]
+        for part in self._parts():
+            for j, end in enumerate(ends):
+                k, left[j] = _keep(part, end, left[j])
+                kept[j].append(k)
+        return [np.concatenate(k) if len(k) != 1 else k[0] for k in kept]
+
+
+def _keep(part: RemovalKeys, end: Threshold, left: int) -> tuple[NDArray[np.int32], int]:
+    """K of a part's pixels, and how many of the removals equal to the threshold are left for the next part."""
+    k, tied = np.empty((2, len(part.offsets) - 1), dtype=np.int32)
+    _split(part.offsets, part.keys, end.key, k, tied)
+    pixels = np.flatnonzero(tied)
+    ties = tied[pixels].astype(np.int64)
+    removed = np.clip(left - (np.cumsum(ties) - ties), 0, ties)
+    k[pixels] -= removed.astype(np.int32)
+    return k, left - int(removed.sum())
 
 
 @njit(parallel=True, cache=True)
 def _running_maxima(
     offsets: NDArray[np.int64], error: NDArray[np.float32], k_min: int, increments: bool, out: NDArray[np.float32]
 ) -> None:
-    # Entry offsets[p] + k - 1 is for the removal that leaves k - 1 fragments; +inf where k_min forbids it.
     for p in prange(len(offsets) - 1):
         first = offsets[p]
         curve = error[first + p : offsets[p + 1] + p + 1]
         largest = np.float32(-np.inf)
         for k in range(len(curve) - 1, 0, -1):
-            if k <= k_min:
-                out[first + k - 1] = np.float32(np.inf)
-                continue
             value = curve[k - 1] - curve[k] if increments else curve[k - 1]
             largest = max(largest, value)
             out[first + k - 1] = largest
 
 
 @njit(parallel=True, cache=True)
-def _split(
-    offsets: NDArray[np.int64], keys: NDArray[np.uint32], threshold: int
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    # A pixel's keys do not rise with k: those above the threshold come first, then those equal to it.
-    above = np.empty(len(offsets) - 1, dtype=np.int32)
-    tied = np.empty(len(offsets) - 1, dtype=np.int32)
+def _forbid(offsets: NDArray[np.int64], k_min: int, keys: NDArray[np.uint32]) -> None:
     for p in prange(len(offsets) - 1):
-        i = offsets[p]
-        while i < offsets[p + 1] and np.int64(keys[i]) > threshold:
-            i += 1
-        above[p] = i - offsets[p]
-        j = i
-        while j < offsets[p + 1] and np.int64(keys[j]) == threshold:
-            j += 1
-        tied[p] = j - i
-    return above, tied
+        for i in range(offsets[p], min(offsets[p] + k_min, offsets[p + 1])):
+            keys[i] = LAST_KEY
+
+
+@njit(parallel=True, cache=True)
+def _split(
+    offsets: NDArray[np.int64], keys: NDArray[np.uint32], threshold: int, k: NDArray[np.int32], tied: NDArray[np.int32]
+) -> None:
+    # A pixel's keys do not rise with k: those above the threshold come first, then those equal to it.
+    for p in prange(len(offsets) - 1):
+        above = _first_at_most(keys, offsets[p], offsets[p + 1], threshold)
+        equal = above
+        while equal < offsets[p + 1] and np.int64(keys[equal]) == threshold:
+            equal += 1
+        k[p], tied[p] = equal - offsets[p], equal - above
+
+
+@njit(inline="always")
+def _first_at_most(keys: NDArray[np.uint32], low: int, high: int, threshold: int) -> int:
+    while low < high:
+        middle = (low + high) >> 1
+        if np.int64(keys[middle]) > threshold:
+            low = middle + 1
+        else:
+            high = middle
+    return low

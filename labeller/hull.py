@@ -30,20 +30,16 @@ class Hulls:
     error: NDArray[np.float32]
     k_min: int
 
-    def slopes(self) -> NDArray[np.float32]:
-        """float32 [M], error saved per fragment on the way to a vertex; +inf at a pixel's first vertex.
+    def steps(self) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Of the step that leads to each vertex from the one before it.
 
-        Not rising within a pixel, rounding included.
+        Returns:
+            float32 [M], error saved per fragment, not rising within a pixel, rounding included; and int32 [M], its
+            fragments. At a pixel's first vertex, to which no step leads, +inf and 0.
         """
-        out = np.empty(len(self.k), dtype=np.float32)
-        _slopes(self.offsets, self.k, self.error, out)
-        return out
-
-    def lengths(self) -> NDArray[np.int32]:
-        """int32 [M], fragments from the vertex before; 0 at a pixel's first vertex."""
-        out = np.diff(self.k, prepend=np.int32(0))
-        out[self.offsets[:-1][np.diff(self.offsets) > 0]] = 0
-        return out
+        slopes, lengths = np.empty(len(self.k), dtype=np.float32), np.empty(len(self.k), dtype=np.int32)
+        _steps(self.offsets, self.k, self.error, slopes, lengths)
+        return slopes, lengths
 
 
 def lower_hulls(curves: Curves, k_min: int) -> Hulls:
@@ -110,13 +106,18 @@ def _compact(
 
 
 @njit(parallel=True, cache=True, error_model="numpy")
-def _slopes(
-    offsets: NDArray[np.int64], k: NDArray[np.int32], error: NDArray[np.float32], out: NDArray[np.float32]
+def _steps(
+    offsets: NDArray[np.int64],
+    k: NDArray[np.int32],
+    error: NDArray[np.float32],
+    slopes: NDArray[np.float32],
+    lengths: NDArray[np.int32],
 ) -> None:
     for p in prange(len(offsets) - 1):
-        last = np.float32(np.inf)
+        last, before = np.float32(np.inf), np.int32(0)
         for i in range(offsets[p], offsets[p + 1]):
+            length = k[i] - before if i > offsets[p] else np.int32(0)
             if i > offsets[p]:
                 saved = np.float64(error[i - 1]) - np.float64(error[i])
-                last = min(last, np.float32(saved / (k[i] - k[i - 1])))
-            out[i] = last
+                last = min(last, np.float32(saved / length))
+            slopes[i], lengths[i], before = last, length, k[i]

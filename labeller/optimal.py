@@ -1,197 +1,168 @@
-"""The Lagrangian optimum of an allocation, with a certificate (METHOD section 3).
+"""The optimal allocation of a view, with a certificate (METHOD section 3).
 
 All pixels share one price `lambda` per fragment: each goes along its hull while a step saves more than that.
 The steps are selected over all pixels by their slopes until the budget is used; what is left over (less than one
-step) is spent by the best single upgrades that fit, on the curves themselves. For any `lambda >= 0`,
-`sum_p min_k (e_p(k) + lambda k) - lambda F` is a lower bound of the error of every allocation within F.
+step) is a small problem among the pixels whose slopes are next to the price, and is solved exactly. For any
+`lambda >= 0`, `sum_p min_k (e_p(k) + lambda k) - lambda F` is a lower bound of the error of every allocation within F;
+where the small problem shows that nothing better exists, the error itself is.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
 from labeller.allocation import Allocation
-from labeller.curves import Curves
-from labeller.greedy import Removals
-from labeller.hull import Hulls
-from labeller.selection import Selector, ascending_keys
+from labeller.core_problem import Core, solve_core
+from labeller.descent import Part, core_of, descend, slope_of
+from labeller.selection import END, Histogram, Threshold
 
-_CANDIDATES: Final = 4096  # pixels that compete for the remainder; all of them in small views
-_CLOSED: Final = 1e-6  # relative gap above which the greedy rules are tried as well
+_AROUND: Final = (512, 8192, 131072)
+"""Fragments on either side of the threshold whose pixels compete for the remainder; more if that proves nothing."""
+_PIXELS: Final = 1 << 16  # that compete, at most
+_ERRORS: Final = 1 << 22  # of their curves, at most
+_ULPS: Final = 8  # slopes are rounded to float32: a step this near to the price may be on its other side
+_ROUNDED: Final = 1e-6  # the same, relative
+
+
+@dataclass(slots=True)
+class _State:
+    """What is known of one budget's allocation while the parts go by.
+
+    Attributes:
+        budget: F.
+        end: Threshold of the steps.
+        left: Fragments that are not spent.
+        k: Of each part.
+        error: Sums of errors of the pixels outside of the core.
+        dual: Sums of errors at the dual's minima.
+        dual_k: Fragments there.
+        core: Of each part, the pixels that compete for the remainder and their curves.
+        whole: Whether that are all pixels of the window.
+    """
+
+    budget: int
+    end: Threshold
+    left: int
+    k: list[NDArray[np.int32]] = field(default_factory=list)
+    error: list[float] = field(default_factory=list)
+    dual: list[float] = field(default_factory=list)
+    dual_k: int = 0
+    core: list[tuple[NDArray[np.int64], Core]] = field(default_factory=list)
+    whole: bool = True
 
 
 class LagrangianAllocator:
     """Optimal allocations of a view for any number of budgets with the same k_min.
 
     Args:
-        curves: Error curves of the view.
-        hulls: Their lower hulls.
+        parts: Gives the view's pixels, in one part or in several one after the other; called anew for each pass.
+        k_min: 0 or 1, that of the parts' hulls.
     """
 
-    def __init__(self, curves: Curves, hulls: Hulls) -> None:
-        self._curves, self._hulls = curves, hulls
-        self._slopes = hulls.slopes()
-        self._least = np.minimum(curves.counts, hulls.k_min).astype(np.int32)
-        self._selector = Selector(ascending_keys(-self._slopes), hulls.lengths())
+    def __init__(self, parts: Callable[[], Iterable[Part]], k_min: int) -> None:
+        self._parts, self._k_min, self._least = parts, k_min, 0
 
-    def allocate(self, budget: int) -> Allocation:
-        """The best allocation found within the budget, with its bound.
+        def items() -> Iterable[tuple[NDArray[np.uint32], NDArray[np.int32]]]:
+            for part in parts():
+                self._least += int(np.minimum(part.curves.counts, k_min).sum())
+                yield part.keys, part.lengths
+
+        self._histogram = Histogram(items())
+
+    def allocate(self, budgets: Sequence[int]) -> list[Allocation]:
+        """The best allocation within each budget, with its bound.
 
         Args:
-            budget: F, at least `sum min(k_min, n)`.
+            budgets: F, at least `sum min(k_min, n)`.
         """
-        hulls = self._hulls
-        spend = budget - int(self._least.sum(dtype=np.int64))
-        end = self._selector.threshold(spend)
-        k = self._least.copy()
-        left = _climb(hulls.offsets, hulls.k, self._selector.keys, end.key, spend - end.below, k)
-        if end.key >> 32:
-            error = self._curves.total(k)
-            return self._certified(budget, k, error, error, 0.0)
-        lam = float(self._slopes[np.flatnonzero(self._selector.keys == end.key)[0]])
-        k = self._upgrade(k, left)
-        error, bound = self._curves.total(k), self._dual(lam, budget)
-        if error - bound > _CLOSED * error:
-            k = self._best_of(k, budget)
-            error = self._curves.total(k)
-        return self._certified(budget, k, error, bound, lam)
+        found: dict[int, Allocation] = {}
+        for around in _AROUND:
+            unproven = [F for F in dict.fromkeys(budgets) if F not in found or not found[F].proven]
+            for made in self._attempt(unproven, around) if unproven else ():
+                known = found.get(made.budget)
+                if known is None or made.proven or made.error < known.error:
+                    found[made.budget] = made
+        return [found[budget] for budget in budgets]
 
-    def _certified(self, budget: int, k: NDArray[np.int32], error: float, bound: float, lam: float) -> Allocation:
-        bound = max(min(bound, error), 0.0)  # they may cross by the rounding of the sums
-        gap = (error - bound) / error if error > 0.0 else 0.0
-        used = int(k.sum(dtype=np.int64))
-        return Allocation("optimal", budget, k, used, error, self._hulls.k_min, False, bound, gap, lam)
-
-    def _dual(self, lam: float, budget: int) -> float:
-        """Value of the dual function at a price: a lower bound of the error within the budget."""
-        k = self._least.copy()
-        _cheapest(self._hulls.offsets, self._hulls.k, self._hulls.error, lam, k)
-        return self._curves.total(k) + lam * (int(k.sum(dtype=np.int64)) - budget)
-
-    def _best_of(self, k: NDArray[np.int32], budget: int) -> NDArray[np.int32]:
-        """Where one step weighs much (few pixels, or next to no error), a greedy rule may have been luckier."""
-        tried = [k, Removals(self._curves, self._hulls.k_min, "greedy").keep(budget)]
-        tried.append(Removals(self._curves, self._hulls.k_min, "increment").keep(budget))
-        return min(tried, key=self._curves.total)
-
-    def _upgrade(self, k: NDArray[np.int32], left: int) -> NDArray[np.int32]:
-        """Spend what is left: repeatedly the upgrade of one pixel that fits and saves most per fragment.
-
-        Or the one upgrade that saves most in all, if that is better than all of those together.
-        """
-        if left <= 0:
-            return k
-        offsets, error = self._curves.offsets, self._curves.error
-        rate, saving = np.zeros(len(k)), np.zeros(len(k))
-        _upgrades(offsets, error, k, left, rate, saving)
-        best = np.arange(len(k))
-        if len(best) > _CANDIDATES:
-            best = np.sort(np.argpartition(rate, -_CANDIDATES)[-_CANDIDATES:])
-        many, one = k.copy(), k.copy()
-        _spend(offsets, error, best, left, many)
-        _spend_at_once(offsets, error, int(np.argmax(saving)), left, one)
-        return min(many, one, key=self._curves.total)
+    def _attempt(self, budgets: Sequence[int], around: int) -> list[Allocation]:
+        spend = [budget - self._least for budget in budgets]
+        ends = self._histogram.thresholds(spend, ((part.keys, part.lengths) for part in self._parts()), around)
+        states = [
+            _State(budget, _widened(end), left - end.below)
+            for budget, end, left in zip(budgets, ends, spend, strict=True)
+        ]
+        for part in self._parts():
+            for state in states:
+                _go_on(state, part)
+        return [_finished(state, self._k_min) for state in states]
 
 
-@njit(cache=True)
-def _climb(
-    offsets: NDArray[np.int64],
-    vertex: NDArray[np.int32],
-    keys: NDArray[np.uint32],
-    threshold: int,
-    left: int,
-    k: NDArray[np.int32],
-) -> int:
-    """Take all steps below the threshold, and those equal to it that fit, by pixel index; what is left."""
-    for p in range(len(k)):
-        for i in range(offsets[p], offsets[p + 1]):
-            key = np.int64(keys[i])
-            if key > threshold:
-                break
-            if key == threshold:
-                cost = vertex[i] - k[p]
-                if cost > left:
-                    break
-                left -= cost
-            k[p] = vertex[i]
-    return left
+def _widened(end: Threshold) -> Threshold:
+    if end.key == END:
+        return end
+    return replace(end, first=max(min(end.first, end.key - _ULPS), 0), last=max(end.last, end.key + _ULPS))
 
 
-@njit(parallel=True, cache=True, error_model="numpy")
-def _cheapest(
-    offsets: NDArray[np.int64],
-    vertex: NDArray[np.int32],
-    error: NDArray[np.float32],
-    lam: float,
-    k: NDArray[np.int32],
-) -> None:
-    for p in prange(len(k)):
-        least = np.inf
-        for i in range(offsets[p], offsets[p + 1]):
-            cost = np.float64(error[i]) + lam * vertex[i]
-            if cost < least:
-                least = cost
-                k[p] = vertex[i]
+def _go_on(state: _State, part: Part) -> None:
+    """One more part of the view."""
+    here = descend(part, state.end, state.left)
+    state.left -= here.spent
+    state.k.append(here.k)
+    state.error.extend(here.error)
+    state.dual.extend(here.dual)
+    state.dual_k += here.dual_k
+    room = _PIXELS - sum(len(pixels) for pixels, _ in state.core)
+    ends = np.cumsum(part.curves.counts[here.window] + 1)
+    taken = min(room, int(np.searchsorted(ends, _ERRORS, side="right")))
+    chosen, others = here.window[:taken], here.window[taken:]
+    state.core.append((chosen, core_of(part, chosen, here.k)))
+    state.whole &= not len(others)
+    state.error.extend(part.curves.error[part.curves.offsets[others] + here.k[others]].astype(np.float64))
 
 
-@njit(cache=True, error_model="numpy")
-def _best_step(
-    offsets: NDArray[np.int64], error: NDArray[np.float32], p: int, k: int, left: int
-) -> tuple[float, int, float, int]:
-    """Largest saving per fragment and its cost, largest saving and its cost, of at most `left` more fragments."""
-    first, n = offsets[p], offsets[p + 1] - offsets[p] - 1
-    here = np.float64(error[first + k])
-    rate, rate_cost, saving, saving_cost = 0.0, 0, 0.0, 0
-    for cost in range(1, min(left, n - k) + 1):
-        saved = here - np.float64(error[first + k + cost])
-        if saved > saving:
-            saving, saving_cost = saved, cost
-        if saved / cost > rate:
-            rate, rate_cost = saved / cost, cost
-    return rate, rate_cost, saving, saving_cost
+def _finished(state: _State, k_min: int) -> Allocation:
+    core, lam = _joined([core for _, core in state.core]), slope_of(state.end.key)
+    core_k, proven = core.base, True
+    if lam > 0.0:
+        solution = solve_core(core, lam, state.left)
+        core_k = solution.k
+        proven = state.whole and solution.complete and solution.loss <= _margin(state.end)
+    error = math.fsum([*state.error, *core.error[core.offsets[:-1] + core_k].astype(np.float64)])
+    # Rounded down: the bound must not lie above the least error. Where nothing better exists, the error is it.
+    dual = (math.fsum(state.dual) + lam * (state.dual_k - state.budget)) * (1.0 - 1e-15)
+    bound = error if proven else min(max(dual, 0.0), error)
+    begin = 0
+    for k, (pixels, _) in zip(state.k, state.core, strict=True):
+        k[pixels] = core_k[begin : begin + len(pixels)]
+        begin += len(pixels)
+    k = np.concatenate([np.empty(0, np.int32), *state.k]) if len(state.k) != 1 else state.k[0]
+    gap = (error - bound) / error if error > 0.0 else 0.0
+    used = int(k.sum(dtype=np.int64))
+    return Allocation("optimal", state.budget, k, used, error, k_min, False, bound, gap, lam, proven)
 
 
-@njit(parallel=True, cache=True)
-def _upgrades(
-    offsets: NDArray[np.int64],
-    error: NDArray[np.float32],
-    k: NDArray[np.int32],
-    left: int,
-    rate: NDArray[np.float64],
-    saving: NDArray[np.float64],
-) -> None:
-    for p in prange(len(k)):
-        best = _best_step(offsets, error, p, k[p], left)
-        rate[p], saving[p] = best[0], best[2]
+def _margin(end: Threshold) -> float:
+    """What a change of any pixel without a step in the window loses at least; 0 if that is lost in rounding."""
+    lam = slope_of(end.key)
+    above = slope_of(end.first) - lam if end.first else math.inf
+    below = lam - slope_of(end.last) if end.last < END else math.inf
+    return max(min(above, below) - _ROUNDED * lam, 0.0)
 
 
-@njit(cache=True)
-def _spend(
-    offsets: NDArray[np.int64], error: NDArray[np.float32], pixels: NDArray[np.int64], left: int, k: NDArray[np.int32]
-) -> None:
-    rates, costs = np.zeros(len(pixels)), np.zeros(len(pixels), dtype=np.int64)
-    for i in range(len(pixels)):
-        rates[i], costs[i], _, _ = _best_step(offsets, error, pixels[i], k[pixels[i]], left)
-    while left > 0:
-        best = -1
-        for i in range(len(pixels)):
-            if costs[i] > left:
-                rates[i], costs[i], _, _ = _best_step(offsets, error, pixels[i], k[pixels[i]], left)
-            if rates[i] > 0.0 and (best < 0 or rates[i] > rates[best]):
-                best = i
-        if best < 0:
-            return
-        k[pixels[best]] += costs[best]
-        left -= costs[best]
-        rates[best], costs[best], _, _ = _best_step(offsets, error, pixels[best], k[pixels[best]], left)
-
-
-@njit(cache=True)
-def _spend_at_once(
-    offsets: NDArray[np.int64], error: NDArray[np.float32], p: int, left: int, k: NDArray[np.int32]
-) -> None:
-    k[p] += _best_step(offsets, error, p, k[p], left)[3]
+def _joined(cores: Sequence[Core]) -> Core:
+    if len(cores) == 1:
+        return cores[0]
+    ends = np.cumsum([0, *(core.offsets[-1] for core in cores)])
+    offsets = [core.offsets[:-1] + end for core, end in zip(cores, ends[:-1], strict=True)]
+    return Core(
+        np.concatenate([*offsets, ends[-1:]]).astype(np.int64),
+        np.concatenate([np.empty(0, np.float32), *(core.error for core in cores)]),
+        np.concatenate([np.empty(0, np.int32), *(core.base for core in cores)]),
+        np.concatenate([np.empty(0, np.int32), *(core.least for core in cores)]),
+    )

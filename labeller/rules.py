@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -11,7 +12,8 @@ from numpy.typing import NDArray
 from labeller.allocation import Allocation, RuleName, measured
 from labeller.baselines import FillName, fixed, weighted
 from labeller.curves import Curves
-from labeller.greedy import Removals
+from labeller.descent import part_of
+from labeller.greedy import RemovalName, Removals, removal_keys
 from labeller.hull import Hulls, lower_hulls
 from labeller.optimal import LagrangianAllocator
 from renderer.allocation.dynamic import dynamic
@@ -53,51 +55,60 @@ def allocate_curves(
     if any(budget < 0 for budget in budgets):
         raise ValueError("a budget cannot be negative")
     n = dump.counts
-    makers: dict[int, Callable[[int], Allocation]] = {}
-    results = []
-    for budget in budgets:
-        least = min(k_min, feasible_k_min(n, budget))
-        if budget >= dump.total:
-            results.append(_everything(rule, budget, n, least))
-            continue
-        if least not in makers:
-            makers[least] = _maker(dump, curves, rule, least, hulls, vkb, fill)
-        results.append(makers[least](budget))
-    return results
+    least = [min(k_min, feasible_k_min(n, budget)) for budget in budgets]
+    results = {F: _everything(rule, F, n, m) for F, m in zip(budgets, least, strict=True) if dump.total <= F}
+    for m in (0, 1):
+        short = [F for F, k in zip(budgets, least, strict=True) if k == m and F not in results]
+        made = _short(dump, curves, short, rule, m, hulls, vkb, fill) if short else []
+        results.update((found.budget, found) for found in made)
+    return [results[budget] for budget in budgets]
 
 
 def _everything(rule: RuleName, budget: int, n: NDArray[np.int64], k_min: int) -> Allocation:
     k, used = n.astype(np.int32), int(n.sum())
     if rule == "optimal":
-        return Allocation(rule, budget, k, used, 0.0, k_min, True, 0.0, 0.0, 0.0)
+        return Allocation(rule, budget, k, used, 0.0, k_min, True, 0.0, 0.0, 0.0, True)
     return Allocation(rule, budget, k, used, 0.0, k_min, True)
 
 
-def _maker(
+def _short(
     dump: FragmentDump,
     curves: Curves,
+    budgets: Sequence[int],
     rule: RuleName,
     k_min: int,
     hulls: Hulls | None,
     vkb: VkbOptions,
     fill: FillName,
-) -> Callable[[int], Allocation]:
-    """What turns a budget (with this k_min, below N) into an allocation."""
+) -> list[Allocation]:
+    """Allocations of budgets below N that share k_min."""
     if rule == "optimal":
-        fits = hulls is not None and hulls.k_min == k_min
-        return LagrangianAllocator(curves, hulls if hulls is not None and fits else lower_hulls(curves, k_min)).allocate
-    counts: Callable[[int], NDArray[np.int32]]
+        part = part_of(curves, hulls if hulls is not None and hulls.k_min == k_min else lower_hulls(curves, k_min))
+        found = LagrangianAllocator(lambda: (part,), k_min).allocate(budgets)
+        return [x if x.proven else _better_of(x, curves) for x in found]
+    counts: list[NDArray[np.int32]]
     if rule in ("greedy", "increment"):
-        counts = Removals(curves, k_min, "greedy" if rule == "greedy" else "increment").keep
+        counts = _removed(curves, k_min, "greedy" if rule == "greedy" else "increment", budgets)
     elif rule in ("fixed", "dynamic"):
-        one_k = fixed if rule == "fixed" else dynamic
-
-        def counts(budget: int) -> NDArray[np.int32]:
-            return one_k(dump.counts, budget)
+        counts = [(fixed if rule == "fixed" else dynamic)(dump.counts, budget) for budget in budgets]
     else:
         assert rule in ("importance", "uniform", "proportional")
+        counts = [weighted(dump, rule, budget, k_min, vkb, fill) for budget in budgets]
+    return [measured(rule, F, k, curves, k_min) for F, k in zip(budgets, counts, strict=True)]
 
-        def counts(budget: int) -> NDArray[np.int32]:
-            return weighted(dump, rule, budget, k_min, vkb, fill)
 
-    return lambda budget: measured(rule, budget, counts(budget), curves, k_min)
+def _better_of(found: Allocation, curves: Curves) -> Allocation:
+    """An allocation that is not proven, or that of a greedy rule which was luckier with the remainder."""
+    names: tuple[RemovalName, ...] = ("greedy", "increment")
+    for name in names:
+        (k,) = _removed(curves, found.k_min, name, [found.budget])
+        error = curves.total(k)
+        if error < found.error:
+            bound = found.bound or 0.0
+            found = replace(found, k=k, used=int(k.sum()), error=error, gap=(error - bound) / error if error else 0.0)
+    return found
+
+
+def _removed(curves: Curves, k_min: int, name: RemovalName, budgets: Sequence[int]) -> list[NDArray[np.int32]]:
+    keys = removal_keys(curves, k_min, name)
+    return Removals(lambda: (keys,)).keep(budgets)

@@ -1,11 +1,13 @@
 """Selecting the first so many of millions of float32 keys without sorting them.
 
-Keys become uint32 numbers of the same order; one histogram of their upper halves serves all budgets, a second
-pass over the one bin that holds the threshold finds its lower half. Two O(M) passes for any number of ties.
+Keys become uint32 numbers of the same order; one histogram of their upper halves serves all targets, a second
+pass over the few bins that hold the thresholds finds their lower halves. Two O(M) passes for any number of ties,
+and both add up over parts, so that a view may come in row bands.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,49 +18,107 @@ from numpy.typing import NDArray
 _BINS: Final = 1 << 16
 LAST_KEY: Final = np.uint32(0xFFFFFFFF)
 """Above every key of a number."""
+END: Final = 1 << 32
+"""Threshold that lies above all keys: everything is selected."""
+
+Items = tuple[NDArray[np.uint32], NDArray[np.int32]]
+"""Keys uint32 [M] and their weights int32 [M] >= 0; empty weights: every item counts 1."""
 
 
 @dataclass(frozen=True, slots=True)
 class Threshold:
-    """Where a selection ends.
+    """Where a selection ends, and a window around it.
 
     Attributes:
-        key: All items with smaller keys are selected, and none with larger ones; 2**32 if all items are.
+        key: All items with smaller keys are selected, and none with larger ones; `END` if all items are.
         below: Sum of the weights of the items with smaller keys, at most the target.
+        first: Least key of the window; 0 if there is none below.
+        last: Greatest key of the window; `END` if there is none above.
     """
 
     key: int
     below: int
+    first: int = 0
+    last: int = END
 
 
-class Selector:
-    """Keys of which several prefixes (by ascending key) are wanted.
+class Histogram:
+    """Weights by the upper half of the keys, added up over parts.
 
     Args:
-        keys: uint32 [M], see `ascending_keys`.
-        weights: int32 [M], >= 0, or None: every item counts 1.
+        parts: The items of all parts.
     """
 
-    def __init__(self, keys: NDArray[np.uint32], weights: NDArray[np.int32] | None = None) -> None:
-        self.keys = keys
-        self._weights = np.empty(0, dtype=np.int32) if weights is None else weights
-        self._upper = np.cumsum(_upper_histogram(keys, self._weights, get_num_threads()).sum(axis=0))
+    def __init__(self, parts: Iterable[Items]) -> None:
+        counts = np.zeros(_BINS, dtype=np.int64)
+        for keys, weights in parts:
+            counts += _upper_histogram(keys, weights, get_num_threads()).sum(axis=0)
+        self._sums = np.cumsum(counts)
 
-    def threshold(self, target: int) -> Threshold:
-        """The largest key such that the items with smaller keys weigh at most `target` together."""
-        if target >= self._upper[-1]:
-            return Threshold(1 << 32, int(self._upper[-1]))
-        upper = int(np.searchsorted(self._upper, target, side="right"))
-        before = int(self._upper[upper - 1]) if upper else 0
-        lower_sums = np.cumsum(_lower_histogram(self.keys, self._weights, upper, get_num_threads()).sum(axis=0))
-        lower = int(np.searchsorted(lower_sums, target - before, side="right"))
-        return Threshold((upper << 16) | lower, before + (int(lower_sums[lower - 1]) if lower else 0))
+    @property
+    def total(self) -> int:
+        """Sum of all weights."""
+        return int(self._sums[-1])
+
+    def thresholds(self, targets: Sequence[int], parts: Iterable[Items], around: int = 0) -> list[Threshold]:
+        """For each target the largest key such that the items with smaller keys weigh at most that together.
+
+        Args:
+            targets: Sums of weights, >= 0.
+            parts: The same items again.
+            around: What the window shall weigh at least on either side of the threshold, where there is so much.
+        """
+        bins = [int(np.searchsorted(self._sums, t, side="right")) if t < self.total else -1 for t in targets]
+        split = sorted(set(bins) - {-1})
+        lower = np.zeros((len(split), _BINS), dtype=np.int64)
+        if split:
+            rows = np.full(_BINS, -1, dtype=np.int32)
+            rows[split] = np.arange(len(split))
+            for keys, weights in parts:
+                lower += _lower_histograms(keys, weights, rows, len(split), get_num_threads()).sum(axis=0)
+        sums = np.cumsum(lower, axis=1)
+        return [
+            Threshold(END, self.total) if upper < 0 else self._threshold(t, upper, sums[split.index(upper)], around)
+            for t, upper in zip(targets, bins, strict=True)
+        ]
+
+    def _threshold(self, target: int, upper: int, sums: NDArray[np.int64], around: int) -> Threshold:
+        before = self._before(upper)
+        lower = int(np.searchsorted(sums, target - before, side="right"))
+        below = before + (int(sums[lower - 1]) if lower else 0)
+        upto = before + int(sums[lower])
+        return Threshold((upper << 16) | lower, below, *self._window(upper, sums, below - around, upto + around))
+
+    def _window(self, upper: int, sums: NDArray[np.int64], least: int, most: int) -> tuple[int, int]:
+        # Within the bin by its lower halves; beyond it by whole bins.
+        before, after = self._before(upper), int(self._sums[upper])
+        if least >= before:
+            first = (upper << 16) | int(np.searchsorted(sums, least - before, side="right"))
+        else:
+            first = int(np.searchsorted(self._sums, least, side="right")) << 16 if least > 0 else 0
+        if most <= after:
+            last = (upper << 16) | int(np.searchsorted(sums, most - before, side="left"))
+        elif most >= self.total:
+            last = END
+        else:
+            last = ((int(np.searchsorted(self._sums, most, side="left")) + 1) << 16) - 1
+        return first, last
+
+    def _before(self, upper: int) -> int:
+        return int(self._sums[upper - 1]) if upper else 0
 
 
 def ascending_keys(values: NDArray[np.float32]) -> NDArray[np.uint32]:
-    """uint32 keys in the order of the float32 values (no NaN), any shape."""
-    bits = np.ascontiguousarray(values, dtype=np.float32).view(np.uint32)
-    return np.where(bits >> 31, ~bits, bits | np.uint32(0x80000000)).astype(np.uint32)
+    """uint32 keys in the order of the float32 values (no NaN). The values' memory becomes that of the keys."""
+    keys = values.view(np.uint32)
+    _to_keys(keys)
+    return keys
+
+
+@njit(parallel=True, cache=True)
+def _to_keys(bits: NDArray[np.uint32]) -> None:
+    for i in prange(len(bits)):
+        bits[i] = ~bits[i] if bits[i] >> 31 else bits[i] | np.uint32(0x80000000)
 
 
 @njit(parallel=True, cache=True)
@@ -72,11 +132,13 @@ def _upper_histogram(keys: NDArray[np.uint32], weights: NDArray[np.int32], parts
 
 
 @njit(parallel=True, cache=True)
-def _lower_histogram(keys: NDArray[np.uint32], weights: NDArray[np.int32], upper: int, parts: int) -> NDArray[np.int64]:
-    counts = np.zeros((parts, _BINS), dtype=np.int64)
+def _lower_histograms(
+    keys: NDArray[np.uint32], weights: NDArray[np.int32], rows: NDArray[np.int32], count: int, parts: int
+) -> NDArray[np.int64]:
+    counts = np.zeros((parts, count, _BINS), dtype=np.int64)
     for part in prange(parts):
-        row = counts[part]
         for i in range(len(keys) * part // parts, len(keys) * (part + 1) // parts):
-            if keys[i] >> 16 == upper:
-                row[keys[i] & 0xFFFF] += weights[i] if len(weights) else 1
+            row = rows[keys[i] >> 16]
+            if row >= 0:
+                counts[part, row, keys[i] & 0xFFFF] += weights[i] if len(weights) else 1
     return counts

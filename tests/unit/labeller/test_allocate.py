@@ -109,8 +109,9 @@ def test_hulls_have_their_lower_points_and_no_flat_end() -> None:
     assert hulls.offsets.tolist() == [0, 3, 3, 3]
     assert hulls.k.tolist() == [1, 2, 4]
     assert hulls.error.tolist() == [7.0, 2.0, 0.0]
-    assert hulls.slopes().tolist() == [np.inf, 5.0, 1.0]
-    assert hulls.lengths().tolist() == [0, 1, 2]
+    slopes, lengths = hulls.steps()
+    assert slopes.tolist() == [np.inf, 5.0, 1.0]
+    assert lengths.tolist() == [0, 1, 2]
 
 
 def test_the_papers_fill_wastes_budget() -> None:

@@ -1,0 +1,205 @@
+"""The few pixels around the price of a Lagrangian allocation, solved exactly (METHOD section 3, the remainder).
+
+Choosing one k per pixel within a budget is a multiple-choice knapsack. At a price `lambda`, choosing k at pixel p loses
+`r_p(k) = e_p(k) + lambda k - min_j (e_p(j) + lambda j) >= 0`, and an unspent fragment loses lambda: an allocation's
+error is the dual bound plus the sum of its losses. What loses more than the best allocation known so far can be in no
+better one. What is left after that is small (a "core": Balas and Zemel 1980, for this problem Pisinger 1995) and is
+searched by dynamic programming over the fragments by which the pixels differ from where they stand.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+_STATES: Final = 1 << 22  # of all pixels together, 4 bytes each
+_WORK: Final = 1 << 27  # steps of the dynamic programming
+_SLACK: Final = 1e-12  # of sums that were added up in another order
+
+
+class Core(NamedTuple):
+    """Pixels that may differ from the Lagrangian allocation.
+
+    Attributes:
+        offsets: int64 [C+1], where their curves begin.
+        error: float32 [E], their curves, from k = 0.
+        base: int32 [C], where they stand.
+        least: int32 [C], fewest fragments they may have.
+    """
+
+    offsets: NDArray[np.int64]
+    error: NDArray[np.float32]
+    base: NDArray[np.int32]
+    least: NDArray[np.int32]
+
+
+class Solution(NamedTuple):
+    """Core fragments of the core's pixels.
+
+    Attributes:
+        k: int32 [C].
+        loss: Loss of the core's pixels and of what stays unspent.
+        complete: Whether no allocation of the core loses less.
+    """
+
+    k: NDArray[np.int32]
+    loss: float
+    complete: bool
+
+
+def solve_core(core: Core, lam: float, left: int) -> Solution:
+    """The best that can be made of a remainder by changing the core's pixels.
+
+    Args:
+        core: The pixels.
+        lam: Price of a fragment, > 0.
+        left: Fragments that are not spent, >= 0.
+    """
+    loss = _losses(core, lam)
+    k = core.base.copy()
+    spent = _spend(core, loss, lam, left, k)
+    best = _total(core, loss, k) + lam * (left - spent)
+    order, first, last = _participants(core, loss, best)
+    width, work = int(last.sum() - first.sum()) + 1, int((last - first + 1).sum())
+    complete = len(order) * width <= _STATES and work * width <= _WORK
+    if not complete:  # only those that lose least, so that what can be done is done
+        affordable = np.cumsum(last - first)
+        steps = np.arange(1, len(order) + 1)
+        fits = (affordable + 1) * steps <= _STATES
+        fits &= (affordable + 1) * (affordable + steps) <= _WORK
+        count = int(fits.sum())
+        order, first, last = order[:count], first[:count], last[:count]
+    found, improved = _search(core, loss, lam, left, order, first, last, best)
+    if improved < best * (1.0 - _SLACK):
+        return Solution(found, improved, complete)
+    return Solution(k, best, complete)
+
+
+def _participants(
+    core: Core, loss: NDArray[np.float64], best: float
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Pixels with a choice that loses less than `best`, those of the least loss first; by how much k may change."""
+    least, first, last = np.empty((3, len(core.base)))
+    _alternatives(core, loss, best, least, first, last)
+    pixels = np.flatnonzero(least < best)
+    order = pixels[np.argsort(least[pixels], kind="stable")]
+    return order, first[order].astype(np.int64), last[order].astype(np.int64)
+
+
+@njit(cache=True, error_model="numpy")
+def _losses(core: Core, lam: float) -> NDArray[np.float64]:
+    loss = np.empty(len(core.error))
+    for c in range(len(core.base)):
+        smallest = np.inf
+        for i in range(core.offsets[c], core.offsets[c + 1]):
+            k = i - core.offsets[c]
+            loss[i] = np.float64(core.error[i]) + lam * k if k >= core.least[c] else np.inf
+            smallest = min(smallest, loss[i])
+        for i in range(core.offsets[c], core.offsets[c + 1]):
+            loss[i] -= smallest
+    return loss
+
+
+@njit(cache=True)
+def _total(core: Core, loss: NDArray[np.float64], k: NDArray[np.int32]) -> float:
+    total = 0.0
+    for c in range(len(k)):
+        total += loss[core.offsets[c] + k[c]]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def _spend(core: Core, loss: NDArray[np.float64], lam: float, left: int, k: NDArray[np.int32]) -> int:
+    """Greedily: the upgrades that save most per fragment and fit, one a pixel; or the one that saves most in all."""
+    rates, costs = np.zeros(len(k)), np.zeros(len(k), dtype=np.int64)
+    largest, pixel, cost = np.float64(0.0), -1, 0
+    for c in range(len(k)):
+        first = core.offsets[c] + core.base[c]
+        for more in range(1, min(left, core.offsets[c + 1] - 1 - first) + 1):
+            saved = np.float64(core.error[first]) - np.float64(core.error[first + more])
+            if saved / more > rates[c]:
+                rates[c], costs[c] = saved / more, more
+            if saved > largest:
+                largest, pixel, cost = saved, c, more
+    spent, gained = 0, 0.0
+    for c in np.argsort(-rates):
+        if rates[c] <= 0.0:
+            break
+        if costs[c] <= left - spent:
+            k[c] += costs[c]
+            spent += costs[c]
+            gained += rates[c] * costs[c]
+    if gained >= largest:
+        return spent
+    k[:] = core.base
+    k[pixel] += cost
+    return cost
+
+
+@njit(cache=True)
+def _alternatives(
+    core: Core,
+    loss: NDArray[np.float64],
+    best: float,
+    least: NDArray[np.float64],
+    first: NDArray[np.float64],
+    last: NDArray[np.float64],
+) -> None:
+    # `first` and `last`: the smallest and the largest change of k that loses less than `best`; 0 is among them.
+    for c in range(len(core.base)):
+        base = core.offsets[c] + core.base[c]
+        least[c], first[c], last[c] = np.inf, 0, 0
+        for i in range(core.offsets[c], core.offsets[c + 1]):
+            if i != base and loss[i] < best:
+                least[c] = min(least[c], loss[i])
+                first[c], last[c] = min(first[c], i - base), max(last[c], i - base)
+
+
+@njit(cache=True, error_model="numpy")
+def _search(
+    core: Core,
+    loss: NDArray[np.float64],
+    lam: float,
+    left: int,
+    order: NDArray[np.int64],
+    first: NDArray[np.int64],
+    last: NDArray[np.int64],
+    best: float,
+) -> tuple[NDArray[np.int32], float]:
+    """Least loss over the changes of the pixels in `order`, and the counts that have it."""
+    down, width = -first.sum(), last.sum() - first.sum() + 1
+    states, following = np.full(width, np.inf), np.full(width, np.inf)
+    chosen = np.zeros((len(order), width), dtype=np.int32)
+    states[down] = _total(core, loss, core.base)
+    for c in order:
+        states[down] -= loss[core.offsets[c] + core.base[c]]
+    states[down] = max(states[down], 0.0)
+    low, high = down, down
+    for j in range(len(order)):
+        base = core.offsets[order[j]] + core.base[order[j]]
+        following[low + first[j] : high + last[j] + 1] = np.inf
+        for change in range(first[j], last[j] + 1):
+            lost = loss[base + change]
+            if lost > best:
+                continue
+            for d in range(low, high + 1):
+                total = states[d] + lost
+                if total <= best and total < following[d + change]:
+                    following[d + change] = total
+                    chosen[j, d + change] = change
+        low, high = low + first[j], high + last[j]
+        states, following = following, states
+    end, least = -1, np.inf
+    for d in range(low, min(high, down + left) + 1):
+        total = states[d] + lam * (down + left - d)
+        if total < least:
+            end, least = d, total
+    k = core.base.copy()
+    if end >= 0:
+        for j in range(len(order) - 1, -1, -1):
+            k[order[j]] += chosen[j, end]
+            end -= chosen[j, end]
+    return k, least
