@@ -1,57 +1,29 @@
 """Error curves of all pixels, and pictures of an allocation, in O(N) for a view (METHOD sections 2 and 3).
 
-For each pixel a front-to-back pass leaves the core colour and transmittance of every k in scratch; a
-back-to-front pass grows the tail's sums and compares each k with the exact colour. All arithmetic is float64.
-A thread's scratch is as long as the longest list it meets, so memory is the curves themselves.
+The compiled part is `labeller.curve_kernels`; all arithmetic is float64, and memory is the curves themselves.
 `labeller.reference` is the plain twin that the tests compare with.
 """
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
-from schemas.colour import decode_gamma2, linear_to_srgb
+from labeller.curve_kernels import Lists, Look, colours_of, errors_of
+from schemas.colour import decode_gamma2
 from schemas.fragments import FragmentDump
-from schemas.problem import Problem
-from schemas.tail import DENSITY_G, MAX_EXPONENT, METRICS, TAILS, MetricName, TailName
+from schemas.problem import ExitCode, Problem
+from schemas.tail import DENSITY_G, METRICS, TAILS, MetricName, TailName
 
 _CHUNKS: Final = 256  # more than threads, of equal numbers of fragments: crowded regions are shared out
-_NODES: Final = 1024
-_LINEAR_PART: Final = 0.0031308  # sRGB: below, the display value is 12.92 times the linear one
 _LEVELS: Final = np.arange(256, dtype=np.float64) / 255.0
 # Alpha 1 never is in a dump (schemas.fragments); should it be, the depth of the pixel stays finite.
 _OPTICAL: Final = -np.log(np.maximum(1.0 - _LEVELS, 1e-3))
-_DENSITY, _EXACT_COVERAGE, _WEIGHTED_AVERAGE, _PAPER = range(4)
-_DISPLAY, _LINEAR, _STORED = range(3)
-_ROUNDING: Final = 1e-24  # squared differences below this are the rounding of float64 sums: the pixel is exact
-
-
-class _Lists(NamedTuple):
-    """A dump, and the chunks of pixels that threads take."""
-
-    offsets: NDArray[np.int64]
-    rgba: NDArray[np.uint8]
-    depth: NDArray[np.float32]
-    background: NDArray[np.uint8]
-    chunks: NDArray[np.int64]
-
-
-class _Look(NamedTuple):
-    """How lists become colours: tail, metric, and tables of the 256 stored values."""
-
-    tail: int
-    g: float
-    space: int
-    decode: NDArray[np.float64]
-    level: NDArray[np.float64]
-    optical: NDArray[np.float64]
-    srgb: NDArray[np.float64]
+_NOTHING: Final = np.empty(0, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +59,11 @@ class Curves:
 
 
 def error_curves(
-    dump: FragmentDump, tail: TailName = "density", g: float = DENSITY_G, metric: MetricName = "display"
+    dump: FragmentDump,
+    tail: TailName = "density",
+    g: float = DENSITY_G,
+    metric: MetricName = "display",
+    weights: NDArray[np.floating] | None = None,
 ) -> Curves:
     """Errors of all pixels for all numbers of core fragments.
 
@@ -96,15 +72,82 @@ def error_curves(
         tail: One of `schemas.tail.TAILS`.
         g: Steepness of the density tail, >= 0.
         metric: `display`: sRGB, clamped; `linear`: linear RGB; `paper`: stored values composited as they are.
+        weights: [P] >= 0, what a pixel's errors count (saliency, the slope of FLIP); None: every pixel counts 1.
 
     Raises:
-        Problem: If the dump is malformed or has a depth that is not finite.
+        Problem: If the dump is malformed or has a depth that is not finite, or if weights are not such numbers.
     """
+    return _error_curves(dump, tail, (g if tail == "density" else 0.0,), g, metric, weights)[0]
+
+
+def error_curves_by_g(
+    dump: FragmentDump,
+    gs: Sequence[float],
+    metric: MetricName = "display",
+    weights: NDArray[np.floating] | None = None,
+) -> list[Curves]:
+    """Errors with the density tail for several steepnesses at once: lists are read, composited and encoded once.
+
+    Args:
+        dump: Fragments of a view.
+        gs: Steepnesses, >= 0.
+        metric: As of `error_curves`.
+        weights: As of `error_curves`.
+
+    Returns:
+        For each g what `error_curves` gives for it, bit for bit.
+
+    Raises:
+        Problem: As of `error_curves`.
+    """
+    return _error_curves(dump, "density", tuple(gs), 0.0, metric, weights)
+
+
+def _error_curves(
+    dump: FragmentDump,
+    tail: TailName,
+    gs: Sequence[float],
+    g: float,
+    metric: MetricName,
+    weights: NDArray[np.floating] | None,
+) -> list[Curves]:
     check_dump(dump)
+    steep = np.array(gs, dtype=np.float64)
+    if not (np.isfinite(steep).all() and (steep >= 0.0).all()):
+        raise Problem(f"The density tail's g is {gs}.", "Give finite numbers that are not negative.", ExitCode.USAGE)
     offsets = dump.offsets + np.arange(dump.pixels + 1)
-    error = np.empty(dump.total + dump.pixels, dtype=np.float32)
-    _error_curves(_lists(dump), _look(tail, g, metric), error)
-    return Curves(offsets, error, tail, float(g), metric)
+    error = np.empty((len(steep), dump.total + dump.pixels), dtype=np.float32)
+    errors_of(_lists(dump), _look(tail, metric), steep, _checked_weights(weights, dump.pixels), error)
+    return [
+        Curves(offsets, e, tail, float(s) if tail == "density" else float(g), metric)
+        for e, s in zip(error, steep, strict=True)
+    ]
+
+
+def _checked_weights(weights: NDArray[np.floating] | None, pixels: int) -> NDArray[np.float64]:
+    """Weights in float64, or none.
+
+    Raises:
+        Problem: They are not one number >= 0 a pixel, or so large or small that errors leave the range of float32.
+    """
+    if weights is None:
+        return _NOTHING
+    w = np.asarray(weights, dtype=np.float64).reshape(-1)
+    if len(w) != pixels:
+        raise Problem(f"There are {len(w)} weights for {pixels} pixels.", "Give one weight a pixel.", ExitCode.USAGE)
+    positive = w[w > 0.0]
+    if not (
+        np.isfinite(w).all()
+        and (w >= 0.0).all()
+        and positive.max(initial=1.0) <= 1e9
+        and positive.min(initial=1.0) >= 1e-9
+    ):
+        raise Problem(
+            "The weights of the pixels are not numbers that can be used.",
+            "Give 0 for pixels that do not count, and numbers from 1e-9 to 1e9 for the others.",
+            ExitCode.USAGE,
+        )
+    return w
 
 
 def composite(
@@ -127,7 +170,7 @@ def composite(
     check_dump(dump)
     out = np.empty((dump.pixels, 3), dtype=np.float32)
     kept = np.clip(np.asarray(k), 0, dump.counts).astype(np.int32)
-    _composite(_lists(dump), _look(tail, g, "linear"), kept, out)
+    colours_of(_lists(dump), _look(tail, "linear"), float(g), kept, out)
     return out
 
 
@@ -153,149 +196,12 @@ def check_dump(dump: FragmentDump) -> None:
         )
 
 
-def _lists(dump: FragmentDump) -> _Lists:
+def _lists(dump: FragmentDump) -> Lists:
     work = dump.offsets + np.arange(dump.pixels + 1)
     chunks = np.searchsorted(work, np.linspace(0, work[-1], _CHUNKS + 1)).astype(np.int64)
-    return _Lists(dump.offsets, dump.rgba, dump.depth, dump.background, chunks)
+    return Lists(dump.offsets, dump.rgba, dump.depth, dump.background, chunks)
 
 
-def _look(tail: TailName, g: float, metric: MetricName) -> _Look:
+def _look(tail: TailName, metric: MetricName) -> Look:
     decode = _LEVELS if metric == "paper" else decode_gamma2(np.arange(256, dtype=np.uint8))
-    return _Look(TAILS.index(tail), float(g), METRICS.index(metric), decode, _LEVELS, _OPTICAL, _srgb_table())
-
-
-def _srgb_table() -> NDArray[np.float64]:
-    """float64 [_NODES, 4], cubic Hermite pieces of the sRGB power part over the square root s of linear light.
-
-    Over s the curve `1.055 s^(5/6) - .055` is smooth where it is used (s > .056): the error stays below 1e-11,
-    at a fifth of the cost of a power.
-    """
-    s = np.arange(_NODES + 1) / _NODES
-    value = np.where(s > 0.0, linear_to_srgb(s * s), 0.0)
-    power = 1.055 * s ** (5.0 / 6.0) - 0.055
-    value = np.where(s > 0.04, power, value)
-    slope = 1.055 * (5.0 / 6.0) * np.maximum(s, 1.0 / _NODES) ** (-1.0 / 6.0) / _NODES
-    v0, v1, d0, d1 = value[:-1], value[1:], slope[:-1], slope[1:]
-    return np.stack([v0, d0, 3.0 * (v1 - v0) - 2.0 * d0 - d1, 2.0 * (v0 - v1) + d0 + d1], axis=1)
-
-
-@njit(inline="always")
-def _encode(value: float, space: int, table: NDArray[np.float64]) -> float:
-    if space != _DISPLAY:
-        return value
-    if value <= _LINEAR_PART:
-        return 12.92 * max(value, 0.0)
-    if value >= 1.0:
-        return 1.0
-    s = math.sqrt(value) * _NODES
-    i = min(int(s), _NODES - 1)
-    x = s - i
-    return float(table[i, 0] + x * (table[i, 1] + x * (table[i, 2] + x * table[i, 3])))
-
-
-@njit(inline="always")
-def _tail_factors(tail: int, count: int, alpha_sum: float, weight_sum: float, through: float) -> tuple[float, float]:
-    """What the tail's weighted colour sum, and the background, are multiplied with."""
-    if count == 0 or weight_sum <= 0.0:
-        return 0.0, 1.0
-    if tail in (_WEIGHTED_AVERAGE, _PAPER):
-        through = max(1.0 - alpha_sum / count, 0.0) ** count
-    opacity = 1.0 if tail == _PAPER else 1.0 - through
-    return opacity / weight_sum, through
-
-
-@njit(inline="always")
-def _steepness(look: _Look, rgba: NDArray[np.uint8], depth: NDArray[np.float32]) -> float:
-    """`g D / (z_max - z_min)` of a pixel's list: the density tail's exponent per metre behind z_min."""
-    extent = np.float64(depth[-1]) - np.float64(depth[0])
-    if look.tail != _DENSITY or extent <= 0.0:
-        return 0.0
-    total = 0.0
-    for i in range(len(rgba)):
-        total += look.optical[rgba[i, 3]]
-    return look.g * total / extent
-
-
-@njit(inline="always")
-def _weight(alpha: float, steepness: float, behind: float) -> float:
-    if steepness == 0.0:
-        return alpha
-    return alpha * math.exp(-min(steepness * behind, MAX_EXPONENT))
-
-
-@njit(parallel=True, cache=True, error_model="numpy")
-def _error_curves(lists: _Lists, look: _Look, error: NDArray[np.float32]) -> None:
-    offsets, decode, level = lists.offsets, look.decode, look.level
-    chunks, background = lists.chunks, lists.background
-    for chunk in prange(len(chunks) - 1):
-        longest = 0
-        for p in range(chunks[chunk], chunks[chunk + 1]):
-            longest = max(longest, offsets[p + 1] - offsets[p])
-        core = np.empty((longest + 1, 4))
-        for p in range(chunks[chunk], chunks[chunk + 1]):
-            n = offsets[p + 1] - offsets[p]
-            curve = error[offsets[p] + p : offsets[p + 1] + p + 1]
-            curve[n] = 0.0
-            if n == 0:
-                continue
-            rgba, depth = lists.rgba[offsets[p] : offsets[p + 1]], lists.depth[offsets[p] : offsets[p + 1]]
-            red, green, blue = decode[background[p, 0]], decode[background[p, 1]], decode[background[p, 2]]
-            r, gr, b, t = 0.0, 0.0, 0.0, 1.0
-            for i in range(n):
-                core[i, 0], core[i, 1], core[i, 2], core[i, 3] = r, gr, b, t
-                v = t * level[rgba[i, 3]]
-                r += v * decode[rgba[i, 0]]
-                gr += v * decode[rgba[i, 1]]
-                b += v * decode[rgba[i, 2]]
-                t *= 1.0 - level[rgba[i, 3]]
-            exact_r = _encode(r + t * red, look.space, look.srgb)
-            exact_g = _encode(gr + t * green, look.space, look.srgb)
-            exact_b = _encode(b + t * blue, look.space, look.srgb)
-            steepness = _steepness(look, rgba, depth)
-            near = np.float64(depth[0])
-            alpha_sum, weight_sum, through = 0.0, 0.0, 1.0
-            r, gr, b = 0.0, 0.0, 0.0
-            for k in range(n - 1, -1, -1):
-                alpha = level[rgba[k, 3]]
-                w = _weight(alpha, steepness, np.float64(depth[k]) - near)
-                alpha_sum += alpha
-                weight_sum += w
-                through *= 1.0 - alpha
-                r += w * decode[rgba[k, 0]]
-                gr += w * decode[rgba[k, 1]]
-                b += w * decode[rgba[k, 2]]
-                share, behind = _tail_factors(look.tail, n - k, alpha_sum, weight_sum, through)
-                t = core[k, 3]
-                d_r = _encode(core[k, 0] + t * (share * r + behind * red), look.space, look.srgb) - exact_r
-                d_g = _encode(core[k, 1] + t * (share * gr + behind * green), look.space, look.srgb) - exact_g
-                d_b = _encode(core[k, 2] + t * (share * b + behind * blue), look.space, look.srgb) - exact_b
-                squared = d_r * d_r + d_g * d_g + d_b * d_b
-                curve[k] = squared if squared > _ROUNDING else 0.0
-
-
-@njit(parallel=True, cache=True, error_model="numpy")
-def _composite(lists: _Lists, look: _Look, kept: NDArray[np.int32], out: NDArray[np.float32]) -> None:
-    offsets, decode, level = lists.offsets, look.decode, look.level
-    chunks, background = lists.chunks, lists.background
-    for chunk in prange(len(chunks) - 1):
-        for p in range(chunks[chunk], chunks[chunk + 1]):
-            n, k = offsets[p + 1] - offsets[p], kept[p]
-            rgba, depth = lists.rgba[offsets[p] : offsets[p + 1]], lists.depth[offsets[p] : offsets[p + 1]]
-            core, t = np.zeros(3), 1.0
-            for i in range(k):
-                for c in range(3):
-                    core[c] += t * level[rgba[i, 3]] * decode[rgba[i, c]]
-                t *= 1.0 - level[rgba[i, 3]]
-            sums, alpha_sum, weight_sum, through = np.zeros(3), 0.0, 0.0, 1.0
-            steepness = _steepness(look, rgba, depth) if k < n else 0.0
-            for i in range(n - 1, k - 1, -1):
-                alpha = level[rgba[i, 3]]
-                w = _weight(alpha, steepness, np.float64(depth[i]) - np.float64(depth[0]))
-                alpha_sum += alpha
-                weight_sum += w
-                through *= 1.0 - alpha
-                for c in range(3):
-                    sums[c] += w * decode[rgba[i, c]]
-            share, behind = _tail_factors(look.tail, n - k, alpha_sum, weight_sum, through)
-            for c in range(3):
-                out[p, c] = core[c] + t * (share * sums[c] + behind * decode[background[p, c]])
+    return Look(TAILS.index(tail), METRICS.index(metric), decode, _LEVELS, _OPTICAL)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 from typing import Final
 
 import numpy as np
@@ -12,10 +11,9 @@ from numpy.typing import NDArray
 from labeller.allocation import Allocation, RuleName, measured
 from labeller.baselines import FillName, fixed, weighted
 from labeller.curves import Curves
-from labeller.descent import part_of
-from labeller.greedy import RemovalName, Removals, removal_keys
+from labeller.descent import Part, part_of
+from labeller.error_rules import allocate_by_error
 from labeller.hull import Hulls, lower_hulls
-from labeller.optimal import LagrangianAllocator
 from renderer.allocation.dynamic import dynamic
 from renderer.allocation.fill import feasible_k_min
 from renderer.allocation.importance import VkbOptions
@@ -52,20 +50,51 @@ def allocate_curves(
     Raises:
         ValueError: If a budget is negative.
     """
+    n = dump.counts
+
+    def short(wanted: list[int], least: int) -> list[Allocation]:
+        return _short(dump, curves, wanted, rule, least, hulls, vkb, fill)
+
+    return each_budget(n, budgets, rule, k_min, short)
+
+
+def each_budget(
+    n: NDArray[np.integer],
+    budgets: Sequence[int],
+    rule: RuleName,
+    k_min: int,
+    short: Callable[[list[int], int], list[Allocation]],
+) -> list[Allocation]:
+    """Allocations in the order of the budgets; those below N that share k_min are made together, equal ones once.
+
+    Args:
+        n: [P], fragments of each pixel.
+        budgets: F, in any order.
+        rule: Rule that makes them.
+        k_min: 0 or 1; where a budget does not cover 1 it is 0.
+        short: Makes the allocations of budgets below N, of which no two are equal, with a k_min that they cover.
+
+    Raises:
+        ValueError: If a budget is negative.
+    """
     if any(budget < 0 for budget in budgets):
         raise ValueError("a budget cannot be negative")
-    n = dump.counts
-    least = [min(k_min, feasible_k_min(n, budget)) for budget in budgets]
-    results = {F: _everything(rule, F, n, m) for F, m in zip(budgets, least, strict=True) if dump.total <= F}
-    for m in (0, 1):
-        short = [F for F, k in zip(budgets, least, strict=True) if k == m and F not in results]
-        made = _short(dump, curves, short, rule, m, hulls, vkb, fill) if short else []
-        results.update((found.budget, found) for found in made)
+    total = int(n.sum(dtype=np.int64))
+    results: dict[int, Allocation] = {}
+    wanted: dict[int, list[int]] = {0: [], 1: []}
+    for budget in dict.fromkeys(budgets):
+        least = min(k_min, feasible_k_min(n, budget))
+        if budget >= total:
+            results[budget] = _everything(rule, budget, n, least)
+        else:
+            wanted[least].append(budget)
+    for least, below in wanted.items():
+        results.update((made.budget, made) for made in (short(below, least) if below else ()))
     return [results[budget] for budget in budgets]
 
 
-def _everything(rule: RuleName, budget: int, n: NDArray[np.int64], k_min: int) -> Allocation:
-    k, used = n.astype(np.int32), int(n.sum())
+def _everything(rule: RuleName, budget: int, n: NDArray[np.integer], k_min: int) -> Allocation:
+    k, used = n.astype(np.int32), int(n.sum(dtype=np.int64))
     if rule == "optimal":
         return Allocation(rule, budget, k, used, 0.0, k_min, True, 0.0, 0.0, 0.0, True)
     return Allocation(rule, budget, k, used, 0.0, k_min, True)
@@ -82,33 +111,15 @@ def _short(
     fill: FillName,
 ) -> list[Allocation]:
     """Allocations of budgets below N that share k_min."""
-    if rule == "optimal":
-        part = part_of(curves, hulls if hulls is not None and hulls.k_min == k_min else lower_hulls(curves, k_min))
-        found = LagrangianAllocator(lambda: (part,), k_min).allocate(budgets)
-        return [x if x.proven else _better_of(x, curves) for x in found]
-    counts: list[NDArray[np.int32]]
-    if rule in ("greedy", "increment"):
-        counts = _removed(curves, k_min, "greedy" if rule == "greedy" else "increment", budgets)
-    elif rule in ("fixed", "dynamic"):
+    if rule in ("optimal", "greedy", "increment"):
+        parts: tuple[Part, ...] = ()
+        if rule == "optimal":
+            fits = hulls is not None and hulls.k_min == k_min
+            parts = (part_of(curves, hulls if hulls is not None and fits else lower_hulls(curves, k_min)),)
+        return allocate_by_error(rule, budgets, k_min, lambda: (curves,), lambda: parts, keep=True)
+    if rule in ("fixed", "dynamic"):
         counts = [(fixed if rule == "fixed" else dynamic)(dump.counts, budget) for budget in budgets]
     else:
         assert rule in ("importance", "uniform", "proportional")
         counts = [weighted(dump, rule, budget, k_min, vkb, fill) for budget in budgets]
     return [measured(rule, F, k, curves, k_min) for F, k in zip(budgets, counts, strict=True)]
-
-
-def _better_of(found: Allocation, curves: Curves) -> Allocation:
-    """An allocation that is not proven, or that of a greedy rule which was luckier with the remainder."""
-    names: tuple[RemovalName, ...] = ("greedy", "increment")
-    for name in names:
-        (k,) = _removed(curves, found.k_min, name, [found.budget])
-        error = curves.total(k)
-        if error < found.error:
-            bound = found.bound or 0.0
-            found = replace(found, k=k, used=int(k.sum()), error=error, gap=(error - bound) / error if error else 0.0)
-    return found
-
-
-def _removed(curves: Curves, k_min: int, name: RemovalName, budgets: Sequence[int]) -> list[NDArray[np.int32]]:
-    keys = removal_keys(curves, k_min, name)
-    return Removals(lambda: (keys,)).keep(budgets)

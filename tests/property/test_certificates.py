@@ -1,0 +1,168 @@
+"""What a certificate says, against exhaustive dynamic programming and against the whole view."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support.curves import curves_of, dump_for, split
+from support.dumps import random_dump
+
+from labeller import reference
+from labeller.allocation import Allocation
+from labeller.curves import Curves, error_curves, error_curves_by_g
+from labeller.error_rules import ErrorRule
+from labeller.rules import allocate_curves
+from labeller.streaming import allocate_bands
+from schemas.fragments import FragmentDump
+from schemas.tail import METRICS, MetricName
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _one_thread() -> Iterator[None]:
+    """Thousands of tiny calls: threads would only wait for each other."""
+    threads = numba.get_num_threads()
+    numba.set_num_threads(1)
+    yield
+    numba.set_num_threads(threads)
+
+
+def dual_bound(curves: Curves, lam: float, budget: int, k_min: int) -> float:
+    """The dual function at a price, from the whole curves, in plain float64."""
+    least = [min(float(e[k]) + lam * k for k in range(min(k_min, len(e) - 1), len(e))) for e in split(curves)]
+    return sum(least) - lam * budget
+
+
+def check(curves: Curves, budgets: list[int], k_min: int) -> list[Allocation]:
+    found = allocate_curves(dump_for(curves), curves, budgets, "optimal", k_min=k_min)
+    rules = [allocate_curves(dump_for(curves), curves, budgets, rule, k_min=k_min) for rule in ("greedy", "increment")]
+    for x, *others in zip(found, *rules, strict=True):
+        best = reference.optimum(split(curves), x.budget, x.k_min)
+        assert x.bound is not None
+        assert x.lam is not None
+        assert x.bound <= best * (1 + 1e-12)
+        assert best <= x.error * (1 + 1e-12) + 1e-300
+        assert x.error == pytest.approx(curves.total(x.k), rel=1e-14)
+        assert x.used == x.k.sum() <= x.budget
+        # The price alone certifies nearly as much, and anybody can check it without trusting the search.
+        assert dual_bound(curves, x.lam, x.budget, x.k_min) <= best * (1 + 1e-9) + 1e-12
+        if x.proven:
+            assert x.error <= best * (1 + 1e-12) + 1e-300
+        for other in others:
+            assert x.error <= other.error * (1 + 1e-12)
+    return found
+
+
+def random_curves(rng: np.random.Generator, kind: int) -> Curves:
+    lists = [[*rng.random(rng.integers(0, 10)), 0.0] for _ in range(rng.integers(1, 9))]
+    if kind == 1:  # falling, as most real curves are
+        lists = [sorted(e, reverse=True) for e in lists]
+    elif kind == 2:  # over many magnitudes
+        lists = [[x * 10.0 ** rng.integers(-20, 1) for x in e] for e in lists]
+    elif kind == 3:  # ties everywhere
+        lists = [[round(3 * x) / 3 for x in e] for e in lists]
+    elif kind == 4:  # nothing helps until nearly everything is there
+        lists = [[0.5 + x / 100 for x in e[:-1]] + [0.0] for e in lists]
+    return curves_of(lists)
+
+
+def test_the_bound_never_exceeds_the_optimum_in_three_thousand_random_cases() -> None:
+    rng = np.random.default_rng(0)
+    proven = []
+    for case in range(1500):
+        curves = random_curves(rng, case % 5)
+        budgets = rng.integers(0, int(curves.counts.sum()) + 1, 2).tolist()
+        proven += [x.proven for x in check(curves, budgets, k_min=case % 2)]
+    assert len(proven) == 3000
+    assert all(proven)
+
+
+errors = st.one_of(st.sampled_from([0.0, 0.25, 0.5, 1.0, 2.0]), st.floats(0.0, 4.0, width=32))
+curve_lists = st.lists(st.lists(errors, max_size=9).map(lambda e: [*e, 0.0]), min_size=1, max_size=8)
+
+
+@settings(max_examples=300, deadline=None)
+@given(curve_lists, st.sampled_from([0, 1]), st.data())
+def test_the_bound_never_exceeds_the_optimum(lists: list[list[float]], k_min: int, data: st.DataObject) -> None:
+    budget = data.draw(st.integers(0, sum(len(e) - 1 for e in lists)))
+    check(curves_of(lists), [budget], k_min)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("k_min", [0, 1])
+def test_views_of_hundreds_of_pixels_reach_the_optimum_exactly(seed: int, k_min: int) -> None:
+    curves = error_curves(random_dump(20, 15, 9, seed=seed))
+    total = int(curves.counts.sum())
+    found = check(curves, [int(share * total) for share in (0.25, 0.4, 0.6, 0.8)], k_min)
+    assert all(x.proven and x.gap == 0.0 for x in found)
+
+
+def test_equal_pixels_by_the_thousand_are_no_trouble() -> None:
+    # Every step ties with every other and none fits what is left: the worst case of the remainder.
+    curves = curves_of([[1.0, 0.95, 0.9, 0.0]] * 5000)
+    for budget, error in ((7, 5000 - 2 - 0.05), (9000, 2000.0), (9001, 2000 - 0.05), (9002, 2000 - 0.1), (14999, 0.9)):
+        (found,) = allocate_curves(dump_for(curves), curves, [budget], "optimal", k_min=0)
+        assert found.error == pytest.approx(error, rel=1e-6)
+        assert found.gap is not None
+        assert found.gap * found.error <= 1.0
+
+
+dumps = st.builds(
+    random_dump,
+    width=st.integers(1, 6),
+    height=st.integers(1, 12),
+    max_n=st.sampled_from([0, 1, 3, 12]),
+    seed=st.integers(0, 2**16),
+    alpha=st.sampled_from([None, 1 / 255, 0.5]),
+)
+
+
+def bands_of(dump: FragmentDump, rows: int) -> list[FragmentDump]:
+    """A view's row bands of some rows each."""
+    made = []
+    for y in range(0, dump.height, rows):
+        p, q = y * dump.width, min(y + rows, dump.height) * dump.width
+        i, j = dump.offsets[p], dump.offsets[q]
+        made.append(
+            FragmentDump(
+                *(dump.width, (q - p) // dump.width, dump.offsets[p : q + 1] - i),
+                *(dump.rgba[i:j], dump.depth[i:j], dump.background[p:q], dump.facing[p:q]),
+            )
+        )
+    return made
+
+
+@settings(max_examples=80, deadline=None)
+@given(dumps, st.integers(1, 5), st.sampled_from(["optimal", "greedy", "increment"]), st.sampled_from([0, 1]))
+def test_row_bands_give_what_the_whole_view_gives(dump: FragmentDump, rows: int, rule: ErrorRule, k_min: int) -> None:
+    occupied, total = int(np.count_nonzero(dump.counts)), dump.total
+    budgets = [max(0, F) for F in (0, occupied - 1, occupied, total // 2, total // 2, total - 1, total + 3)]
+    bands = bands_of(dump, rows)
+    whole = allocate_curves(dump, error_curves(dump), budgets, rule, k_min=k_min)
+    for found, expected in zip(allocate_bands(lambda: iter(bands), budgets, rule, k_min=k_min), whole, strict=True):
+        assert np.array_equal(found.k, expected.k)
+        assert found.error == pytest.approx(expected.error, rel=1e-12)
+        assert (found.k_min, found.exact, found.used) == (expected.k_min, expected.exact, expected.used)
+        assert found.bound == (None if rule != "optimal" else pytest.approx(expected.bound, rel=1e-9))
+
+
+@settings(max_examples=60, deadline=None)
+@given(dumps, st.lists(st.floats(0.0, 4.0), min_size=1, max_size=5), st.sampled_from(METRICS))
+def test_several_g_at_once_give_what_each_gives_alone(dump: FragmentDump, gs: list[float], metric: MetricName) -> None:
+    for g, found in zip(gs, error_curves_by_g(dump, gs, metric), strict=True):
+        alone = error_curves(dump, "density", g, metric)
+        assert np.array_equal(found.error, alone.error)
+        assert (found.g, found.tail, found.metric) == (alone.g, alone.tail, alone.metric)
+
+
+@settings(max_examples=60, deadline=None)
+@given(dumps, st.integers(0, 2**16))
+def test_weights_multiply_the_errors_of_their_pixel(dump: FragmentDump, seed: int) -> None:
+    weights = np.random.default_rng(seed).choice([0.0, 1e-6, 1.0, 37.5], dump.pixels)
+    plain, weighted = error_curves(dump), error_curves(dump, weights=weights)
+    expected = plain.error * np.repeat(weights, dump.counts + 1)
+    np.testing.assert_allclose(weighted.error, expected, rtol=2e-7)
