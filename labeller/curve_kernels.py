@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from labeller.numerics import tail_weights, to_display
+from labeller.numerics import add_squared, display_of, tail_weights
 from schemas.tail import MAX_EXPONENT
 
 DENSITY: Final = 0
@@ -46,29 +46,48 @@ class Look(NamedTuple):
 
 
 class _Block(NamedTuple):
-    """Entries of consecutive pixels; entry `m` of a pixel stands for k = m.
+    """Entries of consecutive pixels, float64 [M]; the entry `at + m` of a pixel that begins at `at` stands for k = m.
 
     Attributes:
-        alpha: float64 [M].
-        colour: float64 [3, M], decoded.
-        exponent: float64 [M], D times the relative depth.
-        base: float64 [3, M], core plus background behind the tail.
-        share: float64 [M], what the mean colour of the tail is multiplied with.
-        weight: float64 [M], of the fragment in the tail.
-        sums: float64 [M], of the weights from the fragment on.
-        mixed: float64 [3, M], colour sums from the fragment on, then the colours and their display values.
-        exact: float64 [3, M], by pixel of the block.
+        alpha: Of fragment m.
+        red: Of fragment m, decoded; so are `green` and `blue`.
+        exponent: D times the relative depth of fragment m.
+        base_red: Core plus background behind the tail; so are the others.
+        exact_red: The pixel's exact colour, encoded; so are the others.
+        share: What the mean colour of the tail is multiplied with.
+        weight: Of fragment m in the tail.
+        factor: Sums of the weights from fragment m on, then the share divided by them.
+        sum_red: Weighted colour sums from fragment m on; so are the others.
+        squared: Squared difference from the exact colour.
     """
 
     alpha: NDArray[np.float64]
-    colour: NDArray[np.float64]
+    red: NDArray[np.float64]
+    green: NDArray[np.float64]
+    blue: NDArray[np.float64]
     exponent: NDArray[np.float64]
-    base: NDArray[np.float64]
+    base_red: NDArray[np.float64]
+    base_green: NDArray[np.float64]
+    base_blue: NDArray[np.float64]
+    exact_red: NDArray[np.float64]
+    exact_green: NDArray[np.float64]
+    exact_blue: NDArray[np.float64]
     share: NDArray[np.float64]
     weight: NDArray[np.float64]
-    sums: NDArray[np.float64]
-    mixed: NDArray[np.float64]
-    exact: NDArray[np.float64]
+    factor: NDArray[np.float64]
+    sum_red: NDArray[np.float64]
+    sum_green: NDArray[np.float64]
+    sum_blue: NDArray[np.float64]
+    squared: NDArray[np.float64]
+
+
+@njit(cache=True)
+def _block(room: int) -> _Block:
+    return _Block(
+        *(np.empty(room), np.empty(room), np.empty(room), np.empty(room), np.empty(room), np.empty(room)),
+        *(np.empty(room), np.empty(room), np.empty(room), np.empty(room), np.empty(room), np.empty(room)),
+        *(np.empty(room), np.empty(room), np.empty(room), np.empty(room), np.empty(room), np.empty(room)),
+    )
 
 
 @njit(parallel=True, cache=True, error_model="numpy")
@@ -93,18 +112,7 @@ def errors_of(
         for p in range(first, end):
             longest = max(longest, offsets[p + 1] - offsets[p])
         room = max(_BLOCK, longest)
-        block = _Block(
-            np.empty(room),
-            np.empty((3, room)),
-            np.empty(room),
-            np.empty((3, room)),
-            np.empty(room),
-            np.empty(room),
-            np.empty(room),
-            np.empty((3, room)),
-            np.empty((3, room)),
-        )
-        counts = np.empty(room, dtype=np.int64)
+        block, counts = _block(room), np.empty(room, dtype=np.int64)
         while first < end:
             last, used = first, 0
             while last < end and last - first < room:
@@ -115,70 +123,69 @@ def errors_of(
                 counts[last - first] = entries
                 used += entries
                 last += 1
-            _gather(lists, look, first, last, counts, block)
+            _gather(lists, look, first, counts[: last - first], block)
             for j in range(len(gs)):
                 _mix(look, gs[j], counts[: last - first], used, block)
-                _compare(lists.offsets, first, counts[: last - first], weights, block, error[j])
+                _store(offsets, first, counts[: last - first], weights, block.squared, error[j])
             first = last
 
 
 @njit(cache=True, error_model="numpy")
-def _gather(lists: Lists, look: Look, first: int, last: int, counts: NDArray[np.int64], block: _Block) -> None:
+def _gather(lists: Lists, look: Look, first: int, counts: NDArray[np.int64], block: _Block) -> None:
     """Everything of the pixels' entries that does not depend on g."""
     at = 0
-    for p in range(first, last):
-        if counts[p - first]:
-            begin, after = lists.offsets[p], lists.offsets[p + 1]
-            _core(look, lists.rgba[begin:after], lists.depth[begin:after], lists.background[p], p - first, at, block)
-            at += after - begin
-    if look.space == DISPLAY:
-        for c in range(3):
-            to_display(block.exact[c, : last - first])
+    for j in range(len(counts)):
+        n = counts[j]
+        if n == 0:
+            continue
+        p = first + j
+        begin = lists.offsets[p]
+        near = np.float64(lists.depth[begin])
+        for i in range(n):
+            block.exponent[np.uint64(at + i)] = np.float64(lists.depth[np.uint64(begin + i)]) - near
+        optical = _core(look, lists.rgba[begin : begin + n], lists.background[p], at, block)
+        extent = block.exponent[at + n - 1]
+        steepness = optical / extent if extent > 0.0 else 0.0
+        for i in range(n):
+            block.exponent[np.uint64(at + i)] *= steepness
+        at += n
 
 
-@njit(cache=True, error_model="numpy")
-def _core(
-    look: Look,
-    rgba: NDArray[np.uint8],
-    depth: NDArray[np.float32],
-    background: NDArray[np.uint8],
-    pixel: int,
-    at: int,
-    block: _Block,
-) -> None:
+@njit(inline="always")
+def _core(look: Look, rgba: NDArray[np.uint8], background: NDArray[np.uint8], at: int, block: _Block) -> float:
+    """Core and background of a pixel's entries, front to back and back again; the pixel's optical depth."""
     n = len(rgba)
     red, green, blue = 0.0, 0.0, 0.0
     through, optical = 1.0, 0.0
-    for i in range(n):
-        alpha = look.level[rgba[i, 3]]
-        r, g, b = look.decode[rgba[i, 0]], look.decode[rgba[i, 1]], look.decode[rgba[i, 2]]
-        block.alpha[at + i] = alpha
-        block.colour[0, at + i], block.colour[1, at + i], block.colour[2, at + i] = r, g, b
-        block.base[0, at + i], block.base[1, at + i], block.base[2, at + i] = red, green, blue
-        block.share[at + i] = through
+    for m in range(n):
+        i, j = np.uint64(at + m), np.uint64(m)
+        alpha = look.level[rgba[j, 3]]
+        r, g, b = look.decode[rgba[j, 0]], look.decode[rgba[j, 1]], look.decode[rgba[j, 2]]
+        block.alpha[i], block.red[i], block.green[i], block.blue[i] = alpha, r, g, b
+        block.base_red[i], block.base_green[i], block.base_blue[i], block.share[i] = red, green, blue, through
         visible = through * alpha
         red += visible * r
         green += visible * g
         blue += visible * b
         through *= 1.0 - alpha
-        optical += look.optical[rgba[i, 3]]
+        optical += look.optical[rgba[j, 3]]
     r, g, b = look.decode[background[0]], look.decode[background[1]], look.decode[background[2]]
-    block.exact[0, pixel], block.exact[1, pixel] = red + through * r, green + through * g
-    block.exact[2, pixel] = blue + through * b
-    near = np.float64(depth[0])
-    extent = np.float64(depth[n - 1]) - near
-    steepness = optical / extent if extent > 0.0 else 0.0
+    red, green, blue = red + through * r, green + through * g, blue + through * b
+    if look.space == DISPLAY:
+        red, green, blue = display_of(red), display_of(green), display_of(blue)
     through, alphas = 1.0, 0.0
-    for i in range(n - 1, -1, -1):
-        through *= 1.0 - block.alpha[at + i]
-        alphas += block.alpha[at + i]
-        opacity, behind = tail_factors(look.tail, n - i, alphas, through)
-        block.exponent[at + i] = steepness * (np.float64(depth[i]) - near)
-        light = block.share[at + i] * behind
-        block.base[0, at + i] += light * r
-        block.base[1, at + i] += light * g
-        block.base[2, at + i] += light * b
-        block.share[at + i] *= opacity
+    for m in range(n):
+        i = np.uint64(at + n - 1 - m)
+        through *= 1.0 - block.alpha[i]
+        alphas += block.alpha[i]
+        opacity, behind = tail_factors(look.tail, m + 1, alphas, through)
+        light = block.share[i] * behind
+        block.base_red[i] += light * r
+        block.base_green[i] += light * g
+        block.base_blue[i] += light * b
+        block.share[i] *= opacity
+        block.exact_red[i], block.exact_green[i], block.exact_blue[i] = red, green, blue
+    return optical
 
 
 @njit(inline="always")
@@ -200,7 +207,7 @@ def tail_factors(tail: int, count: int, alphas: float, through: float) -> tuple[
 
 @njit(cache=True, error_model="numpy")
 def _mix(look: Look, g: float, counts: NDArray[np.int64], used: int, block: _Block) -> None:
-    """The colours of all entries, encoded."""
+    """Squared differences of all entries."""
     weight = block.alpha
     if look.tail == DENSITY and g > 0.0:
         weight = block.weight
@@ -208,56 +215,49 @@ def _mix(look: Look, g: float, counts: NDArray[np.int64], used: int, block: _Blo
     at = 0
     for n in counts:
         red, green, blue, total = 0.0, 0.0, 0.0, 0.0
-        for i in range(at + n - 1, at - 1, -1):
+        for m in range(n):
+            i = np.uint64(at + n - 1 - m)
             w = weight[i]
             total += w
-            red += w * block.colour[0, i]
-            green += w * block.colour[1, i]
-            blue += w * block.colour[2, i]
-            block.mixed[0, i], block.mixed[1, i], block.mixed[2, i] = red, green, blue
-            block.sums[i] = total
+            red += w * block.red[i]
+            green += w * block.green[i]
+            blue += w * block.blue[i]
+            block.sum_red[i], block.sum_green[i], block.sum_blue[i], block.factor[i] = red, green, blue, total
         at += n
-    _divide(block.share[:used], block.sums[:used])
-    for c in range(3):
-        _add(block.base[c, :used], block.sums[:used], block.mixed[c, :used])
-        if look.space == DISPLAY:
-            to_display(block.mixed[c, :used])
+    factor, squared = block.factor[:used], block.squared[:used]
+    _divide(block.share[:used], factor)
+    squared[:] = 0.0
+    display = look.space == DISPLAY
+    add_squared(block.base_red[:used], factor, block.sum_red[:used], block.exact_red[:used], display, squared)
+    add_squared(block.base_green[:used], factor, block.sum_green[:used], block.exact_green[:used], display, squared)
+    add_squared(block.base_blue[:used], factor, block.sum_blue[:used], block.exact_blue[:used], display, squared)
 
 
 @njit(cache=True, error_model="numpy")
-def _divide(share: NDArray[np.float64], sums: NDArray[np.float64]) -> None:
-    for i in range(len(sums)):
-        sums[i] = share[i] / (sums[i] if sums[i] > 0.0 else 1.0)
+def _divide(share: NDArray[np.float64], factor: NDArray[np.float64]) -> None:
+    for i in range(len(factor)):
+        factor[i] = share[i] / (factor[i] if factor[i] > 0.0 else 1.0)
 
 
 @njit(cache=True, error_model="numpy")
-def _add(base: NDArray[np.float64], factor: NDArray[np.float64], mixed: NDArray[np.float64]) -> None:
-    for i in range(len(mixed)):
-        mixed[i] = base[i] + factor[i] * mixed[i]
-
-
-@njit(cache=True, error_model="numpy")
-def _compare(
+def _store(
     offsets: NDArray[np.int64],
     first: int,
     counts: NDArray[np.int64],
     weights: NDArray[np.float64],
-    block: _Block,
+    squared: NDArray[np.float64],
     error: NDArray[np.float32],
 ) -> None:
     at = 0
     for j in range(len(counts)):
         p = first + j
-        curve = error[offsets[p] + p : offsets[p + 1] + p + 1]
-        n = counts[j]
         scale = weights[p] if len(weights) else 1.0
-        red, green, blue = block.exact[0, j], block.exact[1, j], block.exact[2, j]
-        for k in range(n):
-            r, g, b = block.mixed[0, at + k] - red, block.mixed[1, at + k] - green, block.mixed[2, at + k] - blue
-            squared = r * r + g * g + b * b
-            curve[k] = squared * scale if squared > _ROUNDING else 0.0
-        for k in range(n, len(curve)):
-            curve[k] = 0.0
+        begin, n = offsets[p] + p, counts[j]
+        for m in range(n):
+            value = squared[np.uint64(at + m)]
+            error[np.uint64(begin + m)] = value * scale if value > _ROUNDING else 0.0
+        for k in range(begin + n, offsets[p + 1] + p + 1):
+            error[k] = 0.0
         at += n
 
 

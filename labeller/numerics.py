@@ -79,11 +79,30 @@ def tail_weights(alpha: NDArray[np.float64], exponent: NDArray[np.float64], g: f
         out[i] = alpha[i] * (y * y * y * y)
 
 
+@njit(inline="always")
+def display_of(linear: float) -> float:
+    """Linear light to the sRGB display value (IEC 61966-2-1), clamped to [0, 1]."""
+    x = linear if linear > 0.0 else 0.0
+    x = x if x < 1.0 else 1.0
+    y = _polynomial(_DISPLAY, math.sqrt(math.sqrt(math.sqrt(x))) * _ROOT_SCALE + _ROOT_SHIFT)
+    return 12.92 * x if x <= _LINEAR_PART else y
+
+
 @njit(cache=True, error_model="numpy")
-def to_display(linear: NDArray[np.float64]) -> None:
-    """Linear light to sRGB display values (IEC 61966-2-1), clamped to [0, 1], in place: float64 [M]."""
-    for i in range(len(linear)):
-        x = linear[i] if linear[i] > 0.0 else 0.0
-        x = x if x < 1.0 else 1.0
-        y = _polynomial(_DISPLAY, math.sqrt(math.sqrt(math.sqrt(x))) * _ROOT_SCALE + _ROOT_SHIFT)
-        linear[i] = 12.92 * x if x <= _LINEAR_PART else y
+def add_squared(
+    base: NDArray[np.float64],
+    factor: NDArray[np.float64],
+    sums: NDArray[np.float64],
+    exact: NDArray[np.float64],
+    display: bool,
+    out: NDArray[np.float64],
+) -> None:
+    """Add the squared differences of `base + factor sums`, as display values if `display`, from `exact`: all [M]."""
+    if display:
+        for i in range(len(out)):
+            difference = display_of(base[i] + factor[i] * sums[i]) - exact[i]
+            out[i] += difference * difference
+    else:
+        for i in range(len(out)):
+            difference = base[i] + factor[i] * sums[i] - exact[i]
+            out[i] += difference * difference

@@ -30,7 +30,8 @@ _SOURCES: Mapping[StageName, tuple[str, ...]] = {
         "services.stages.render",
     ),
     "label": (
-        *("labeller", "renderer.allocation", "renderer.features", "renderer.dump", "schemas.tail", "schemas.colour"),
+        *("labeller", "renderer.allocation", "renderer.features", "renderer.dump"),
+        *("schemas.tail", "schemas.colour", "schemas.skips"),
         "services.stages.label",
     ),
     "train": (
@@ -44,7 +45,7 @@ _SOURCES: Mapping[StageName, tuple[str, ...]] = {
         "services.stages.export",
     ),
     "evaluate": (
-        "labeller.curves",
+        *("labeller.curves", "labeller.curve_kernels"),
         *(
             f"renderer.{name}"
             for name in ("allocation", "features", "metrics", "onnx_network", "screen", "shaders", "techniques")

@@ -32,13 +32,21 @@ def test_the_coefficients_are_those_of_the_fits() -> None:
 
 def test_display_values_are_those_of_the_standard() -> None:
     x = np.concatenate([[-1.0, 0.0, 1e-30, 0.0031308, 0.00313081, 1.0, 1.0 + 1e-15, 2.0], np.linspace(0, 1, 100_001)])
-    found = x.copy()
-    numerics.to_display(found)
+    found = np.array([numerics.display_of(value) for value in x])
     np.testing.assert_allclose(found, linear_to_srgb(np.clip(x, 0.0, 1.0)), rtol=0.0, atol=2e-12)
     # The standard's own two pieces do not meet exactly: 3e-8 apart at .0031308.
-    rising = np.linspace(0.0031309, 1.0, 1_000_001)
-    numerics.to_display(rising)
-    assert (np.diff(rising) > 0.0).all()
+    rising = np.linspace(0.0031309, 1.0, 100_001)
+    assert (np.diff([numerics.display_of(value) for value in rising]) > 0.0).all()
+
+
+@pytest.mark.parametrize("display", [True, False])
+def test_squared_differences_add_up(display: bool) -> None:
+    base, factor, sums, exact, before = np.random.default_rng(0).random((5, 1000))
+    colour = base + factor * sums
+    found = before.copy()
+    numerics.add_squared(base, factor, sums, exact, display, found)
+    shown = linear_to_srgb(np.clip(colour, 0.0, 1.0)) if display else colour
+    np.testing.assert_allclose(found, before + (shown - exact) ** 2, rtol=1e-11)
 
 
 @pytest.mark.parametrize("g", [0.25, 0.75, 3.0])
