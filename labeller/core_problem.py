@@ -5,6 +5,11 @@ Choosing one k per pixel within a budget is a multiple-choice knapsack. At a pri
 error is the dual bound plus the sum of its losses. What loses more than the best allocation known so far can be in no
 better one. What is left after that is small (a "core": Balas and Zemel 1980, for this problem Pisinger 1995) and is
 searched by dynamic programming over the fragments by which the pixels differ from where they stand.
+
+Where many pixels are alike, few of them are enough. Pixels of one solution whose changes cancel could as well stay
+where they are. Changes of at most D fragments each can be put in an order in which their sums stay between -D and D,
+or what is left; so sums repeat, and some changes cancel, if there are more than `2 D + left` of them. A solution
+changes no more pixels than that, and of all pixels that could change by the same number only so many are looked at.
 """
 
 from __future__ import annotations
@@ -18,6 +23,7 @@ from numpy.typing import NDArray
 _STATES: Final = 1 << 22  # of all pixels together, 4 bytes each
 _WORK: Final = 1 << 27  # steps of the dynamic programming
 _SLACK: Final = 1e-12  # of sums that were added up in another order
+_ROUNDING: Final = 1e-14  # of a loss, relative to the least cost of its pixel
 
 
 class Core(NamedTuple):
@@ -62,31 +68,54 @@ def solve_core(core: Core, lam: float, left: int) -> Solution:
     k = core.base.copy()
     spent = _spend(core, loss, lam, left, k)
     best = _total(core, loss, k) + lam * (left - spent)
-    order, first, last = _participants(core, loss, best)
-    width, work = int(last.sum() - first.sum()) + 1, int((last - first + 1).sum())
-    complete = len(order) * width <= _STATES and work * width <= _WORK
-    if not complete:  # only those that lose least, so that what can be done is done
-        affordable = np.cumsum(last - first)
-        steps = np.arange(1, len(order) + 1)
-        fits = (affordable + 1) * steps <= _STATES
-        fits &= (affordable + 1) * (affordable + steps) <= _WORK
-        count = int(fits.sum())
-        order, first, last = order[:count], first[:count], last[:count]
-    found, improved = _search(core, loss, lam, left, order, first, last, best)
+    pixels, first, last, changes = _participants(core, loss, best, left)
+    reach = changes * int(max(last.max(initial=0), -first.min(initial=0)))
+    complete = True
+    # Too much work: only those that lose least, so that what can be done is done.
+    while len(pixels) and not _affordable(first, last, reach):
+        complete = False
+        half = len(pixels) // 2
+        pixels, first, last = pixels[:half], first[:half], last[:half]
+    found, improved = _search(core, loss, lam, left, (pixels, first, last), reach, best)
     if improved < best * (1.0 - _SLACK):
         return Solution(found, improved, complete)
     return Solution(k, best, complete)
 
 
+Changes = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]
+"""Pixels of a core, and the least and the greatest change of k of each that could be part of a better solution."""
+
+
 def _participants(
-    core: Core, loss: NDArray[np.float64], best: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Pixels with a choice that loses less than `best`, those of the least loss first; by how much k may change."""
-    least, first, last = np.empty((3, len(core.base)))
+    core: Core, loss: NDArray[np.float64], best: float, left: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], int]:
+    """Pixels with a change that loses less than `best`, those of the least loss first; how many may change at once."""
+    here = core.offsets[:-1] + core.base
+    least, first, last = np.empty(len(here)), *np.empty((2, len(here)), dtype=np.int64)
     _alternatives(core, loss, best, least, first, last)
-    pixels = np.flatnonzero(least < best)
-    order = pixels[np.argsort(least[pixels], kind="stable")]
-    return order, first[order].astype(np.int64), last[order].astype(np.int64)
+    moves = least < best
+    most = int(max(last.max(initial=0), -first.min(initial=0)))
+    astray = moves & (loss[here] > 0.0)  # a change of these may gain by itself
+    changes = 2 * most + left + 1 + int(astray.sum()) * (most + 1)
+    if int(moves.sum()) > changes:
+        needed = astray.copy()
+        for change in range(-most, most + 1):
+            candidates = np.flatnonzero(moves & (first <= change) & (change <= last)) if change else here[:0]
+            if len(candidates) > changes:
+                lost = loss[here[candidates] + change]
+                limit = np.partition(lost, changes - 1)[changes - 1]
+                below, equal = candidates[lost < limit], candidates[lost == limit]
+                candidates = np.concatenate([below, equal[: changes - len(below)]])
+            needed[candidates] = True
+        moves &= needed
+    pixels = np.flatnonzero(moves)
+    pixels = pixels[np.argsort(least[pixels], kind="stable")]
+    return pixels, first[pixels], last[pixels], min(changes, len(pixels))
+
+
+def _affordable(first: NDArray[np.int64], last: NDArray[np.int64], reach: int) -> bool:
+    width = min(int(-first.sum()), reach) + min(int(last.sum()), reach) + 1
+    return len(first) * width <= _STATES and int((last - first + 1).sum()) * width <= _WORK
 
 
 @njit(cache=True, error_model="numpy")
@@ -100,6 +129,8 @@ def _losses(core: Core, lam: float) -> NDArray[np.float64]:
             smallest = min(smallest, loss[i])
         for i in range(core.offsets[c], core.offsets[c + 1]):
             loss[i] -= smallest
+            if loss[i] <= _ROUNDING * smallest:
+                loss[i] = 0.0
     return loss
 
 
@@ -145,8 +176,8 @@ def _alternatives(
     loss: NDArray[np.float64],
     best: float,
     least: NDArray[np.float64],
-    first: NDArray[np.float64],
-    last: NDArray[np.float64],
+    first: NDArray[np.int64],
+    last: NDArray[np.int64],
 ) -> None:
     # `first` and `last`: the smallest and the largest change of k that loses less than `best`; 0 is among them.
     for c in range(len(core.base)):
@@ -164,33 +195,34 @@ def _search(
     loss: NDArray[np.float64],
     lam: float,
     left: int,
-    order: NDArray[np.int64],
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
+    changes: Changes,
+    reach: int,
     best: float,
 ) -> tuple[NDArray[np.int32], float]:
-    """Least loss over the changes of the pixels in `order`, and the counts that have it."""
-    down, width = -first.sum(), last.sum() - first.sum() + 1
+    """Least loss over changes of some pixels whose sums stay within `reach` either way, and the counts that have it."""
+    pixels, first, last = changes
+    down = min(-first.sum(), reach)
+    width = down + min(last.sum(), reach) + 1
     states, following = np.full(width, np.inf), np.full(width, np.inf)
-    chosen = np.zeros((len(order), width), dtype=np.int32)
+    chosen = np.zeros((len(pixels), width), dtype=np.int32)
     states[down] = _total(core, loss, core.base)
-    for c in order:
+    for c in pixels:
         states[down] -= loss[core.offsets[c] + core.base[c]]
     states[down] = max(states[down], 0.0)
     low, high = down, down
-    for j in range(len(order)):
-        base = core.offsets[order[j]] + core.base[order[j]]
-        following[low + first[j] : high + last[j] + 1] = np.inf
+    for j in range(len(pixels)):
+        base = core.offsets[pixels[j]] + core.base[pixels[j]]
+        following[max(low + first[j], 0) : min(high + last[j], width - 1) + 1] = np.inf
         for change in range(first[j], last[j] + 1):
             lost = loss[base + change]
             if lost > best:
                 continue
-            for d in range(low, high + 1):
+            for d in range(max(low, -change), min(high, width - 1 - change) + 1):
                 total = states[d] + lost
                 if total <= best and total < following[d + change]:
                     following[d + change] = total
                     chosen[j, d + change] = change
-        low, high = low + first[j], high + last[j]
+        low, high = max(low + first[j], 0), min(high + last[j], width - 1)
         states, following = following, states
     end, least = -1, np.inf
     for d in range(low, min(high, down + left) + 1):
@@ -199,7 +231,7 @@ def _search(
             end, least = d, total
     k = core.base.copy()
     if end >= 0:
-        for j in range(len(order) - 1, -1, -1):
-            k[order[j]] += chosen[j, end]
+        for j in range(len(pixels) - 1, -1, -1):
+            k[pixels[j]] += chosen[j, end]
             end -= chosen[j, end]
     return k, least

@@ -56,18 +56,22 @@ class Descent:
     Attributes:
         k: int32 [P], after all steps below the threshold, and those equal to it that fit.
         spent: Fragments of the steps equal to the threshold.
+        slope: Error saved per fragment of the first of those steps, not rounded; 0 if there is none.
         error: float64, sums of the errors of the pixels that have no step in the window.
         dual: float64, sums of `e_p(j)` at the j that minimise `e_p(j) + lambda j`.
         dual_k: Sum of those j.
         window: int64, pixels with a step in the window.
+        outside: How many pixels have steps, but none in the window.
     """
 
     k: NDArray[np.int32]
     spent: int
+    slope: float
     error: NDArray[np.float64]
     dual: NDArray[np.float64]
     dual_k: int
     window: NDArray[np.int64]
+    outside: int
 
 
 def descend(part: Part, end: Threshold, left: int) -> Descent:
@@ -83,10 +87,11 @@ def descend(part: Part, end: Threshold, left: int) -> Descent:
     chunks = np.searchsorted(work, np.linspace(0, work[-1], _CHUNKS + 1)).astype(np.int64)
     steps = _Steps(part.curves.offsets, hulls.offsets, hulls.k, hulls.error, part.keys, hulls.k_min)
     k, flags = np.empty(pixels, dtype=np.int32), np.zeros(pixels, dtype=np.uint8)
-    error, dual, dual_k = np.zeros(_CHUNKS), np.zeros(_CHUNKS), np.zeros(_CHUNKS, dtype=np.int64)
-    _walk(chunks, steps, (end.key, end.first, end.last, slope_of(end.key)), k, flags, error, dual, dual_k)
-    spent = _take_ties(np.flatnonzero(flags & _TIED), steps, end.key, left, k)
-    return Descent(k, spent, error, dual, int(dual_k.sum()), np.flatnonzero(flags))
+    error, dual, counts = np.zeros(_CHUNKS), np.zeros(_CHUNKS), np.zeros((_CHUNKS, 2), dtype=np.int64)
+    _walk(chunks, steps, (end.key, end.first, end.last, slope_of(end.key)), k, flags, error, dual, counts)
+    spent, slope = _take_ties(np.flatnonzero(flags & _TIED), steps, end.key, left, k)
+    dual_k, outside = counts.sum(axis=0)
+    return Descent(k, spent, slope, error, dual, int(dual_k), np.flatnonzero(flags), int(outside))
 
 
 def core_of(part: Part, pixels: NDArray[np.int64], k: NDArray[np.int32]) -> Core:
@@ -123,12 +128,12 @@ def _walk(
     flags: NDArray[np.uint8],
     error: NDArray[np.float64],
     dual: NDArray[np.float64],
-    dual_k: NDArray[np.int64],
+    counts: NDArray[np.int64],
 ) -> None:
     threshold, first, last, lam = end
     for chunk in prange(len(chunks) - 1):
         # Neumaier's compensated sums: errors of very different size meet here.
-        error_sum, error_lost, dual_sum, dual_lost, fragments = 0.0, 0.0, 0.0, 0.0, 0
+        error_sum, error_lost, dual_sum, dual_lost, fragments, outside = 0.0, 0.0, 0.0, 0.0, 0, 0
         for p in range(chunks[chunk], chunks[chunk + 1]):
             begin, after = steps.offsets[p], steps.offsets[p + 1]
             if begin == after:  # exact whatever it gets: it takes no part
@@ -154,25 +159,31 @@ def _walk(
             dual_lost += (dual_sum - total) + value if dual_sum >= value else (value - total) + dual_sum
             dual_sum = total
             if flag == 0:
+                outside += 1
                 value = np.float64(steps.error[chosen])
                 total = error_sum + value
                 error_lost += (error_sum - total) + value if error_sum >= value else (value - total) + error_sum
                 error_sum = total
-        error[chunk], dual[chunk], dual_k[chunk] = error_sum + error_lost, dual_sum + dual_lost, fragments
+        error[chunk], dual[chunk] = error_sum + error_lost, dual_sum + dual_lost
+        counts[chunk, 0], counts[chunk, 1] = fragments, outside
 
 
 @njit(cache=True)
-def _take_ties(pixels: NDArray[np.int64], steps: _Steps, threshold: int, left: int, k: NDArray[np.int32]) -> int:
-    spent = 0
+def _take_ties(
+    pixels: NDArray[np.int64], steps: _Steps, threshold: int, left: int, k: NDArray[np.int32]
+) -> tuple[int, float]:
+    spent, slope = 0, 0.0
     for p in pixels:
         for i in range(steps.offsets[p] + 1, steps.offsets[p + 1]):
             key = np.int64(steps.keys[i])
             if key == threshold:
                 length = steps.vertex[i] - steps.vertex[i - 1]
+                if slope == 0.0:
+                    slope = (np.float64(steps.error[i - 1]) - np.float64(steps.error[i])) / length
                 if length > left - spent:
                     break
                 spent += length
                 k[p] = steps.vertex[i]
             elif key > threshold:
                 break
-    return spent
+    return spent, slope

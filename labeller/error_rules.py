@@ -39,19 +39,22 @@ def allocate_by_error(
     """
     if rule == "optimal":
         found = LagrangianAllocator(parts, k_min).allocate(budgets)
-        return [x if x.proven else _better_of(x, curves, keep) for x in found]
+        return _never_above_greedy(found, k_min, curves, keep)
     return _removed(rule, budgets, k_min, curves, keep)
 
 
-def _better_of(found: Allocation, curves: CurveParts, keep: bool) -> Allocation:
-    """An allocation that is not proven, or that of a greedy rule which was luckier with the remainder."""
+def _never_above_greedy(found: list[Allocation], k_min: int, curves: CurveParts, keep: bool) -> list[Allocation]:
+    """Where an allocation is not proven, a greedy rule may have been luckier with the remainder."""
+    best = {x.budget: x for x in found}
+    unproven = [budget for budget, x in best.items() if not x.proven]
     names: tuple[RemovalName, ...] = ("greedy", "increment")
-    for name in names:
-        (other,) = _removed(name, [found.budget], found.k_min, curves, keep)
-        if other.error < found.error:
-            gap = (other.error - (found.bound or 0.0)) / other.error if other.error > 0.0 else 0.0
-            found = replace(found, k=other.k, used=other.used, error=other.error, gap=gap)
-    return found
+    for name in names if unproven else ():
+        for other in _removed(name, unproven, k_min, curves, keep):
+            known = best[other.budget]
+            if other.error < known.error:
+                gap = (other.error - (known.bound or 0.0)) / other.error if other.error > 0.0 else 0.0
+                best[other.budget] = replace(known, k=other.k, used=other.used, error=other.error, gap=gap)
+    return [best[x.budget] for x in found]
 
 
 def _removed(rule: RemovalName, budgets: Sequence[int], k_min: int, curves: CurveParts, keep: bool) -> list[Allocation]:

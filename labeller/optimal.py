@@ -38,22 +38,26 @@ class _State:
         budget: F.
         end: Threshold of the steps.
         left: Fragments that are not spent.
+        price: Slope of a step at the threshold, not rounded: steps that tie then lose exactly nothing.
         k: Of each part.
         error: Sums of errors of the pixels outside of the core.
         dual: Sums of errors at the dual's minima.
         dual_k: Fragments there.
         core: Of each part, the pixels that compete for the remainder and their curves.
-        whole: Whether that are all pixels of the window.
+        outside: How many pixels with steps are not in the window.
+        whole: Whether the core has all pixels of the window.
     """
 
     budget: int
     end: Threshold
     left: int
+    price: float = 0.0
     k: list[NDArray[np.int32]] = field(default_factory=list)
     error: list[float] = field(default_factory=list)
     dual: list[float] = field(default_factory=list)
     dual_k: int = 0
     core: list[tuple[NDArray[np.int64], Core]] = field(default_factory=list)
+    outside: int = 0
     whole: bool = True
 
 
@@ -82,15 +86,18 @@ class LagrangianAllocator:
             budgets: F, at least `sum min(k_min, n)`.
         """
         found: dict[int, Allocation] = {}
+        open_ = list(dict.fromkeys(budgets))
         for around in _AROUND:
-            unproven = [F for F in dict.fromkeys(budgets) if F not in found or not found[F].proven]
-            for made in self._attempt(unproven, around) if unproven else ():
-                known = found.get(made.budget)
+            states = self._descended(open_, around) if open_ else []
+            for state in states:
+                made, known = _finished(state, self._k_min), found.get(state.budget)
                 if known is None or made.proven or made.error < known.error:
-                    found[made.budget] = made
+                    found[state.budget] = made
+            # A window that has more pixels than can be looked at is not made larger.
+            open_ = [state.budget for state in states if state.whole and not found[state.budget].proven]
         return [found[budget] for budget in budgets]
 
-    def _attempt(self, budgets: Sequence[int], around: int) -> list[Allocation]:
+    def _descended(self, budgets: Sequence[int], around: int) -> list[_State]:
         spend = [budget - self._least for budget in budgets]
         ends = self._histogram.thresholds(spend, ((part.keys, part.lengths) for part in self._parts()), around)
         states = [
@@ -100,7 +107,7 @@ class LagrangianAllocator:
         for part in self._parts():
             for state in states:
                 _go_on(state, part)
-        return [_finished(state, self._k_min) for state in states]
+        return states
 
 
 def _widened(end: Threshold) -> Threshold:
@@ -113,26 +120,28 @@ def _go_on(state: _State, part: Part) -> None:
     """One more part of the view."""
     here = descend(part, state.end, state.left)
     state.left -= here.spent
+    state.price = state.price or here.slope
     state.k.append(here.k)
     state.error.extend(here.error)
     state.dual.extend(here.dual)
     state.dual_k += here.dual_k
+    state.outside += here.outside
     room = _PIXELS - sum(len(pixels) for pixels, _ in state.core)
     ends = np.cumsum(part.curves.counts[here.window] + 1)
     taken = min(room, int(np.searchsorted(ends, _ERRORS, side="right")))
     chosen, others = here.window[:taken], here.window[taken:]
     state.core.append((chosen, core_of(part, chosen, here.k)))
     state.whole &= not len(others)
-    state.error.extend(part.curves.error[part.curves.offsets[others] + here.k[others]].astype(np.float64))
+    state.error.append(float(part.curves.error[part.curves.offsets[others] + here.k[others]].sum(dtype=np.float64)))
 
 
 def _finished(state: _State, k_min: int) -> Allocation:
     core, lam = _joined([core for _, core in state.core]), slope_of(state.end.key)
     core_k, proven = core.base, True
     if lam > 0.0:
-        solution = solve_core(core, lam, state.left)
+        solution = solve_core(core, state.price, state.left)
         core_k = solution.k
-        proven = state.whole and solution.complete and solution.loss <= _margin(state.end)
+        proven = state.whole and solution.complete and solution.loss <= _margin(state)
     error = math.fsum([*state.error, *core.error[core.offsets[:-1] + core_k].astype(np.float64)])
     # Rounded down: the bound must not lie above the least error. Where nothing better exists, the error is it.
     dual = (math.fsum(state.dual) + lam * (state.dual_k - state.budget)) * (1.0 - 1e-15)
@@ -147,9 +156,11 @@ def _finished(state: _State, k_min: int) -> Allocation:
     return Allocation("optimal", state.budget, k, used, error, k_min, False, bound, gap, lam, proven)
 
 
-def _margin(end: Threshold) -> float:
+def _margin(state: _State) -> float:
     """What a change of any pixel without a step in the window loses at least; 0 if that is lost in rounding."""
-    lam = slope_of(end.key)
+    if not state.outside:
+        return math.inf
+    end, lam = state.end, slope_of(state.end.key)
     above = slope_of(end.first) - lam if end.first else math.inf
     below = lam - slope_of(end.last) if end.last < END else math.inf
     return max(min(above, below) - _ROUNDED * lam, 0.0)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.curves import curves_of, dump_for, split
-from support.dumps import random_dump
+from support.dumps import dump_of, random_dump
 
 from labeller import reference
 from labeller.allocation import Allocation
@@ -67,6 +67,8 @@ def random_curves(rng: np.random.Generator, kind: int) -> Curves:
         lists = [[round(3 * x) / 3 for x in e] for e in lists]
     elif kind == 4:  # nothing helps until nearly everything is there
         lists = [[0.5 + x / 100 for x in e[:-1]] + [0.0] for e in lists]
+    elif kind == 5:  # many pixels of few kinds: only some of each are looked at
+        lists = [lists[i][-6:] for i in rng.integers(0, min(len(lists), 3), 60)]
     return curves_of(lists)
 
 
@@ -74,7 +76,7 @@ def test_the_bound_never_exceeds_the_optimum_in_three_thousand_random_cases() ->
     rng = np.random.default_rng(0)
     proven = []
     for case in range(1500):
-        curves = random_curves(rng, case % 5)
+        curves = random_curves(rng, case % 6)
         budgets = rng.integers(0, int(curves.counts.sum()) + 1, 2).tolist()
         proven += [x.proven for x in check(curves, budgets, k_min=case % 2)]
     assert len(proven) == 3000
@@ -107,8 +109,19 @@ def test_equal_pixels_by_the_thousand_are_no_trouble() -> None:
     for budget, error in ((7, 5000 - 2 - 0.05), (9000, 2000.0), (9001, 2000 - 0.05), (9002, 2000 - 0.1), (14999, 0.9)):
         (found,) = allocate_curves(dump_for(curves), curves, [budget], "optimal", k_min=0)
         assert found.error == pytest.approx(error, rel=1e-6)
-        assert found.gap is not None
-        assert found.gap * found.error <= 1.0
+        assert found.proven
+
+
+@pytest.mark.parametrize("k_min", [0, 1])
+def test_a_picture_of_equal_lists_is_proven(k_min: int) -> None:
+    rng = np.random.default_rng(4)
+    kinds = [(rng.integers(1, 255, (40, 4), dtype=np.uint8), np.arange(1, 41, dtype=np.float32)) for _ in range(3)]
+    curves = error_curves(dump_of([kinds[i % 3] for i in range(3000)]))
+    total = int(curves.counts.sum())
+    budgets = [int(share * total) + 1 for share in (0.25, 0.4, 0.6, 0.8)]
+    for found in allocate_curves(dump_for(curves), curves, budgets, "optimal", k_min=k_min):
+        assert found.proven
+        assert dual_bound(curves, found.lam or 0.0, found.budget, k_min) <= found.error * (1 + 1e-9)
 
 
 dumps = st.builds(
