@@ -64,8 +64,7 @@ class Removals:
     def keep(self, budgets: Sequence[int]) -> list[NDArray[np.int32]]:
         """int32 [P] for each budget, k once no more fragments are left; equal to the literal heap, ties included."""
         targets = [max(self._histogram.total - budget, 0) for budget in budgets]
-        items = ((part.keys, _NO_WEIGHTS) for part in self._parts())
-        ends = self._histogram.thresholds(targets, items)
+        ends = self._histogram.thresholds(targets, lambda: ((part.keys, _NO_WEIGHTS) for part in self._parts()))
         left = [target - end.below for target, end in zip(targets, ends, strict=True)]
         kept: list[list[NDArray[np.int32]]] = [[] for _ in budgets]
         for part in self._parts():

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from labeller.allocation import Allocation
 from labeller.core_problem import Core, solve_core
 from labeller.descent import Part, core_of, descend, slope_of
-from labeller.selection import END, Histogram, Threshold
+from labeller.selection import END, Histogram, Items, Threshold
 
 _AROUND: Final = (512, 8192, 131072)
 """Fragments on either side of the threshold whose pixels compete for the remainder; more if that proves nothing."""
@@ -72,12 +72,12 @@ class LagrangianAllocator:
     def __init__(self, parts: Callable[[], Iterable[Part]], k_min: int) -> None:
         self._parts, self._k_min, self._least = parts, k_min, 0
 
-        def items() -> Iterable[tuple[NDArray[np.uint32], NDArray[np.int32]]]:
+        def counted() -> Iterable[Items]:
             for part in parts():
                 self._least += int(np.minimum(part.curves.counts, k_min).sum())
                 yield part.keys, part.lengths
 
-        self._histogram = Histogram(items())
+        self._histogram = Histogram(counted())
 
     def allocate(self, budgets: Sequence[int]) -> list[Allocation]:
         """The best allocation within each budget, with its bound.
@@ -99,7 +99,11 @@ class LagrangianAllocator:
 
     def _descended(self, budgets: Sequence[int], around: int) -> list[_State]:
         spend = [budget - self._least for budget in budgets]
-        ends = self._histogram.thresholds(spend, ((part.keys, part.lengths) for part in self._parts()), around)
+
+        def items() -> Iterable[Items]:
+            return ((part.keys, part.lengths) for part in self._parts())
+
+        ends = self._histogram.thresholds(spend, items, around)
         states = [
             _State(budget, _widened(end), left - end.below)
             for budget, end, left in zip(budgets, ends, spend, strict=True)

@@ -7,7 +7,7 @@ and both add up over parts, so that a view may come in row bands.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,6 +16,7 @@ from numba import get_num_threads, njit, prange
 from numpy.typing import NDArray
 
 _BINS: Final = 1 << 16
+_AT_ONCE: Final = 32  # bins that are split in one pass: half a megabyte each, for every thread
 LAST_KEY: Final = np.uint32(0xFFFFFFFF)
 """Above every key of a number."""
 END: Final = 1 << 32
@@ -60,25 +61,29 @@ class Histogram:
         """Sum of all weights."""
         return int(self._sums[-1])
 
-    def thresholds(self, targets: Sequence[int], parts: Iterable[Items], around: int = 0) -> list[Threshold]:
+    def thresholds(
+        self, targets: Sequence[int], parts: Callable[[], Iterable[Items]], around: int = 0
+    ) -> list[Threshold]:
         """For each target the largest key such that the items with smaller keys weigh at most that together.
 
         Args:
             targets: Sums of weights, >= 0.
-            parts: The same items again.
+            parts: Gives the same items again; called once for every 32 bins that have to be split.
             around: What the window shall weigh at least on either side of the threshold, where there is so much.
         """
         bins = [int(np.searchsorted(self._sums, t, side="right")) if t < self.total else -1 for t in targets]
         split = sorted(set(bins) - {-1})
-        lower = np.zeros((len(split), _BINS), dtype=np.int64)
-        if split:
+        sums: dict[int, NDArray[np.int64]] = {}
+        for first in range(0, len(split), _AT_ONCE):
+            some = split[first : first + _AT_ONCE]
             rows = np.full(_BINS, -1, dtype=np.int32)
-            rows[split] = np.arange(len(split))
-            for keys, weights in parts:
-                lower += _lower_histograms(keys, weights, rows, len(split), get_num_threads()).sum(axis=0)
-        sums = np.cumsum(lower, axis=1)
+            rows[some] = np.arange(len(some))
+            lower = np.zeros((len(some), _BINS), dtype=np.int64)
+            for keys, weights in parts():
+                lower += _lower_histograms(keys, weights, rows, len(some), get_num_threads()).sum(axis=0)
+            sums.update(zip(some, np.cumsum(lower, axis=1), strict=True))
         return [
-            Threshold(END, self.total) if upper < 0 else self._threshold(t, upper, sums[split.index(upper)], around)
+            Threshold(END, self.total) if upper < 0 else self._threshold(t, upper, sums[upper], around)
             for t, upper in zip(targets, bins, strict=True)
         ]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from support.curves import curves_of, dump_for
@@ -122,3 +124,16 @@ def test_the_papers_fill_wastes_budget() -> None:
     (exact,) = allocate_curves(dump, curves, [budget], "importance")
     assert paper.used < 0.95 * budget
     assert exact.used == budget
+
+
+def test_a_hundred_budgets_give_what_each_gives_alone() -> None:
+    dump = random_dump(30, 20, 9, seed=5)
+    curves = error_curves(dump)
+    budgets = np.linspace(0, dump.total, 100).astype(int).tolist()
+    for rule in ("optimal", "greedy"):
+        together = allocate_curves(dump, curves, budgets, rule)
+        for budget, found in list(zip(budgets, together, strict=True))[::9]:
+            assert np.array_equal(found.k, allocate_curves(dump, curves, [budget], rule)[0].k)
+        for k_min in (0, 1):  # the error rises where k_min becomes 1: pixels that need nothing get a fragment
+            errors = [x.error for x in together if x.k_min == k_min]
+            assert rule == "greedy" or all(b <= a * (1 + 1e-12) for a, b in pairwise(errors))
