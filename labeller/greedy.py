@@ -62,7 +62,14 @@ class Removals:
         self._histogram = Histogram((part.keys, _NO_WEIGHTS) for part in parts())
 
     def keep(self, budgets: Sequence[int]) -> list[NDArray[np.int32]]:
-        """int32 [P] for each budget, k once no more fragments are left; equal to the literal heap, ties included."""
+        """k once no more fragments are left than a budget allows; equal to the literal heap, ties included.
+
+        Args:
+            budgets: F, at least `sum min(k_min, n)`.
+
+        Returns:
+            int32 [P] for each budget.
+        """
         targets = [max(self._histogram.total - budget, 0) for budget in budgets]
         ends = self._histogram.thresholds(targets, lambda: ((part.keys, _NO_WEIGHTS) for part in self._parts()))
         left = [target - end.below for target, end in zip(targets, ends, strict=True)]

@@ -28,6 +28,7 @@ _PIXELS: Final = 1 << 16  # that compete, at most
 _ERRORS: Final = 1 << 22  # of their curves, at most
 _ULPS: Final = 8  # slopes are rounded to float32: a step this near to the price may be on its other side
 _ROUNDED: Final = 1e-6  # the same, relative
+_SUMS_ROUNDED: Final = 1e-13  # relative: error and bound are sums in float64
 
 
 @dataclass(slots=True)
@@ -147,9 +148,10 @@ def _finished(state: _State, k_min: int) -> Allocation:
         core_k = solution.k
         proven = state.whole and solution.complete and solution.loss <= _margin(state)
     error = math.fsum([*state.error, *core.error[core.offsets[:-1] + core_k].astype(np.float64)])
+    dual = math.fsum(state.dual) + lam * (state.dual_k - state.budget)
+    proven |= dual >= error * (1.0 - _SUMS_ROUNDED)
     # Rounded down: the bound must not lie above the least error. Where nothing better exists, the error is it.
-    dual = (math.fsum(state.dual) + lam * (state.dual_k - state.budget)) * (1.0 - 1e-15)
-    bound = error if proven else min(max(dual, 0.0), error)
+    bound = error if proven else min(max(dual * (1.0 - 1e-15), 0.0), error)
     begin = 0
     for k, (pixels, _) in zip(state.k, state.core, strict=True):
         k[pixels] = core_k[begin : begin + len(pixels)]
