@@ -112,9 +112,7 @@ def _error_curves(
     weights: NDArray[np.floating] | None,
 ) -> list[Curves]:
     check_dump(dump)
-    steep = np.array(gs, dtype=np.float64)
-    if not (np.isfinite(steep).all() and (steep >= 0.0).all()):
-        raise Problem(f"The density tail's g is {gs}.", "Give finite numbers that are not negative.", ExitCode.USAGE)
+    steep = _checked_g(gs)
     offsets = dump.offsets + np.arange(dump.pixels + 1)
     error = np.empty((len(steep), dump.total + dump.pixels), dtype=np.float32)
     errors_of(_lists(dump), _look(tail, metric), steep, _checked_weights(weights, dump.pixels), error)
@@ -122,6 +120,13 @@ def _error_curves(
         Curves(offsets, e, tail, float(s) if tail == "density" else float(g), metric)
         for e, s in zip(error, steep, strict=True)
     ]
+
+
+def _checked_g(gs: Sequence[float]) -> NDArray[np.float64]:
+    steep = np.array(gs, dtype=np.float64)
+    if not (np.isfinite(steep).all() and (steep >= 0.0).all()):
+        raise Problem(f"The density tail's g is {gs}.", "Give finite numbers that are not negative.", ExitCode.USAGE)
+    return steep
 
 
 def _checked_weights(weights: NDArray[np.floating] | None, pixels: int) -> NDArray[np.float64]:
@@ -165,9 +170,10 @@ def composite(
         float32 [P, 3], linear RGB.
 
     Raises:
-        Problem: If the dump is malformed or has a depth that is not finite.
+        Problem: If the dump is malformed or has a depth that is not finite, or if g is not a number >= 0.
     """
     check_dump(dump)
+    (g,) = _checked_g((g,))
     out = np.empty((dump.pixels, 3), dtype=np.float32)
     kept = np.clip(np.asarray(k), 0, dump.counts).astype(np.int32)
     colours_of(_lists(dump), _look(tail, "linear"), float(g), kept, out)

@@ -62,7 +62,7 @@ class Removals:
         self._histogram = Histogram((part.keys, _NO_WEIGHTS) for part in parts())
 
     def keep(self, budgets: Sequence[int]) -> list[NDArray[np.int32]]:
-        """k once no more fragments are left than a budget allows; equal to the literal heap, ties included.
+        """What is kept once no more fragments are left than a budget allows; equal to the literal heap, ties included.
 
         Args:
             budgets: F, at least `sum min(k_min, n)`.

@@ -1,16 +1,15 @@
 """Label shards: per-pixel rows of one view with all that training needs, in one safetensors file.
 
-A row holds a pixel's features and the lower hull of its error curve. The file's metadata hold what concerns the
-whole view as JSON, and a sha256 over that JSON and all tensors, so that damage is found when a shard is read.
+A row holds a pixel's features and the lower hull of its error curve. What concerns the whole view is in the file's
+metadata. `labeller.shard_file` is about the bytes and how they are verified, `labeller.columns` about the columns,
+`labeller.dataset` about many shards together.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
-import os
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -18,12 +17,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, ValidationError
-from safetensors import SafetensorError, safe_open
-from safetensors.numpy import save
 
 from labeller.curves import Curves
 from labeller.hull import Hulls
 from labeller.rules import allocate_curves
+from labeller.sampling import Sampling, SamplingKind, sample_pixels
+from labeller.shard_file import Columns, Damage, OtherSchema, ShardFile, Written, open_columns, write_columns
+from labeller.skips import needed_budgets
 from renderer.features import derive, gather
 from schemas.fragments import FragmentDump
 from schemas.problem import ExitCode, Problem
@@ -74,7 +74,7 @@ class ShardMeta(BaseModel):
         g: Steepness of the density tail.
         metric: Space of the error.
         k_min: First k of the hulls.
-        seed: Seed of the sample.
+        sampling: How the rows were drawn.
         levels: Optimal allocations, by rising budget.
     """
 
@@ -89,7 +89,7 @@ class ShardMeta(BaseModel):
     g: float
     metric: MetricName
     k_min: int
-    seed: int
+    sampling: Sampling
     levels: tuple[Level, ...]
 
 
@@ -121,6 +121,11 @@ class Shard:
         return self.meta.k_min
 
     @property
+    def segments(self) -> int:
+        """Hull segments of all rows: vertices, less one for each row that has any."""
+        return len(self.hull_k) - int(np.count_nonzero(np.diff(self.hull_offsets)))
+
+    @property
     def price_range(self) -> tuple[float, float]:
         """Least and greatest log lambda of the levels; (0, 0) if no budget of the view is short."""
         prices = [level.log_lambda for level in self.meta.levels if level.log_lambda is not None]
@@ -145,8 +150,9 @@ def write_shard(
     budgets: Sequence[int],
     fraction: float = 0.2,
     seed: int = 0,
-) -> None:
-    """Sample a view and write its shard, atomically.
+    kind: SamplingKind = "stratified",
+) -> Written:
+    """Sample a view and write its shard, atomically. Any number of processes may write shards of one data set.
 
     Args:
         path: File to write; its folder exists.
@@ -154,88 +160,155 @@ def write_shard(
         curves: Its error curves.
         hulls: The curves' hulls.
         budgets: Fragment counts F that results are measured at; those of N and above are left out.
-        fraction: Share of the pixels with more than k_min fragments that become rows, the same for every n.
+        fraction: Share of the pixels with more than k_min fragments that become rows.
         seed: Seed of the sample.
+        kind: `stratified`: the same share of every n; `uniform`: the same probability for every pixel, as in DHOIT.
+
+    Returns:
+        Sums and size, for the index of a data set.
     """
-    sizes = np.diff(hulls.offsets)
-    # Pixels without a hull gain nothing, but a predictor that does not know them would spend on them all the same.
+    sampling = Sampling(kind=kind, fraction=fraction, seed=seed)
+    # Pixels that are exact at k_min gain nothing, but a predictor meets them in every frame: rows without a segment.
     eligible = np.flatnonzero(dump.counts > hulls.k_min)
-    pixel = stratified_sample(eligible, dump.counts[eligible], fraction, seed)
-    rows = sizes[pixel]
-    hull_offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(rows)])
-    vertices = np.arange(hull_offsets[-1]) + np.repeat(hulls.offsets[pixel] - hull_offsets[:-1], rows)
-    shard = Shard(
-        features=derive(gather(dump)[pixel]),
-        n=dump.counts[pixel].astype(np.int32),
-        pixel=pixel.astype(np.int32),
-        hull_offsets=hull_offsets,
-        hull_k=hulls.k[vertices],
-        hull_error=hulls.error[vertices],
-        meta=ShardMeta(
-            width=dump.width,
-            height=dump.height,
-            fragments=dump.total,
-            occupied=int(np.count_nonzero(dump.counts)),
-            eligible=len(eligible),
-            tail=curves.tail,
-            g=curves.g,
-            metric=curves.metric,
-            k_min=hulls.k_min,
-            seed=seed,
-            levels=_levels(dump, curves, hulls, budgets),
-        ),
+    meta = ShardMeta(
+        width=dump.width,
+        height=dump.height,
+        fragments=dump.total,
+        occupied=int(np.count_nonzero(dump.counts)),
+        eligible=len(eligible),
+        tail=curves.tail,
+        g=curves.g,
+        metric=curves.metric,
+        k_min=hulls.k_min,
+        sampling=sampling,
+        levels=_levels(dump, curves, hulls, budgets),
     )
-    _write_atomically(path, _serialised(shard))
+    columns = _columns(dump, hulls, sample_pixels(eligible, dump.counts[eligible], sampling))
+    return write_columns(path, columns, meta.model_dump(mode="json"))
 
 
-def read_shard(path: Path) -> Shard:
-    """Read a shard and verify it.
+def read_shard(path: Path, header_sha256: str | None = None) -> Shard:
+    """Read a shard and verify all of it.
+
+    Args:
+        path: The file.
+        header_sha256: What the index says of it; None: the shard is verified by itself.
 
     Raises:
         Problem: The file is missing, is not a shard, or is damaged; it names the file.
     """
-    try:
-        with safe_open(path, framework="numpy") as file:
-            about = json.loads((file.metadata() or {})["shard"])
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - not a mapping
-        if about["sha256"] != _digest(tensors, about["view"]):
-            raise ValueError("its content does not match its checksum")
-        return Shard(**tensors, meta=ShardMeta.model_validate_json(about["view"]))
-    except FileNotFoundError as error:
-        raise Problem(f"There is no label shard {path}.", "Build it again.", ExitCode.NOT_FOUND) from error
-    except (SafetensorError, ValidationError, OSError, KeyError, TypeError, ValueError) as error:
-        raise Problem(
-            f"The label shard {path} is damaged: {error}.", "Delete it, and run the same command again."
-        ) from error
+    return _read(path, header_sha256, lambda file: (0, file.layout.rows))
 
 
-def stratified_sample(
-    pixels: NDArray[np.integer], n: NDArray[np.integer], fraction: float, seed: int
-) -> NDArray[np.int64]:
-    """A share of the pixels, spread evenly over n: every (1/fraction)-th in random order within equal n.
+def read_rows(path: Path, start: int, stop: int, header_sha256: str | None = None) -> Shard:
+    """Read the rows `start <= r < stop` of a shard: the header and the blocks of rows that hold them, verified.
 
     Args:
-        pixels: [E], pixel indices.
-        n: [E], fragments of each.
-        fraction: Share to take, in (0, 1].
-        seed: Equal seeds give equal samples.
+        path: The file.
+        start: First row, 0..R.
+        stop: Row after the last, start..R.
+        header_sha256: What the index says of it; None: the shard is verified by itself.
 
-    Returns:
-        int64, ascending.
+    Raises:
+        Problem: The file is missing, is not a shard, or what was read of it is damaged; it names the file.
+        IndexError: The shard does not have these rows.
     """
-    rng = np.random.default_rng(seed)
-    shuffled = rng.permutation(len(pixels))
-    ordered = shuffled[np.argsort(n[shuffled], kind="stable")]
-    chosen = np.floor((np.arange(math.ceil(len(pixels) * fraction)) + rng.random()) / fraction).astype(np.int64)
-    return np.sort(pixels[ordered[chosen[chosen < len(pixels)]]]).astype(np.int64)
+
+    def part(file: ShardFile) -> tuple[int, int]:
+        if not 0 <= start <= stop <= file.layout.rows:
+            raise IndexError(f"{path} has the rows 0..{file.layout.rows}, not {start}..{stop}")
+        return start, stop
+
+    return _read(path, header_sha256, part)
+
+
+@contextmanager
+def explained(path: Path) -> Iterator[None]:
+    """What goes wrong while a shard is read, as a problem that names the file and says what to do.
+
+    Args:
+        path: The shard.
+    """
+    try:
+        yield
+    except FileNotFoundError as error:
+        raise Problem(
+            f"There is no label shard {path}.", "Build it again, or copy the data set again.", ExitCode.NOT_FOUND
+        ) from error
+    except OtherSchema as error:
+        raise Problem(
+            f"The label shard {path} cannot be read: {error}.", "Build it again.", ExitCode.CHECK_FAILED
+        ) from error
+    except ValidationError as error:
+        raise damaged(path, "its header is not valid") from error
+    except (Damage, OSError) as error:
+        raise damaged(path, error) from error
+
+
+def damaged(path: Path, why: object) -> Problem:
+    """A shard that is not what was written: named, with what to do."""
+    return Problem(
+        f"The label shard {path} is damaged: {why}.",
+        "Delete it and run the same command again, or copy the data set again.",
+        ExitCode.CHECK_FAILED,
+    )
+
+
+def _read(path: Path, header_sha256: str | None, part: Callable[[ShardFile], tuple[int, int]]) -> Shard:
+    with explained(path), open_columns(path, header_sha256) as file:
+        meta = ShardMeta.model_validate(file.layout.view)
+        return _shard(file.read(*part(file)), meta)
+
+
+def _columns(dump: FragmentDump, hulls: Hulls, pixel: NDArray[np.int64]) -> Columns:
+    """What the file holds of the rows: of each hull segment its length, and the error at its start."""
+    vertices = np.diff(hulls.offsets)[pixel]
+    segments = np.maximum(vertices - 1, 0)
+    ends = np.cumsum(segments)
+    first = np.repeat(hulls.offsets[pixel] - (ends - segments), segments)
+    start = np.arange(len(first)) + first
+    n = dump.counts[pixel]
+    count = np.uint16 if n.max(initial=0) < 1 << 16 else np.uint32
+    return {
+        "features": derive(gather(dump)[pixel]),
+        "n": n.astype(count),
+        "pixel": pixel.astype(np.uint32),
+        "hull_segments": segments.astype(count),
+        "hull_length": (hulls.k[start + 1] - hulls.k[start]).astype(count),
+        "hull_error": hulls.error[start],
+    }
+
+
+def _shard(columns: Columns, meta: ShardMeta) -> Shard:
+    """The rows with their hulls' vertices."""
+    segments = columns["hull_segments"].astype(np.int64)
+    has_hull = segments > 0
+    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(segments + has_hull)])
+    starts = np.ones(offsets[-1], dtype=bool)
+    starts[offsets[1:][has_hull] - 1] = False
+    error = np.zeros(offsets[-1], dtype=np.float32)
+    error[starts] = columns["hull_error"]
+    step = np.zeros(offsets[-1] + 1, dtype=np.int64)
+    step[1:][starts] = columns["hull_length"]
+    k = np.cumsum(step)[:-1]
+    k += meta.k_min - np.repeat(k[offsets[:-1][has_hull]], segments[has_hull] + 1)
+    return Shard(
+        features=columns["features"].astype(np.float32, copy=False),
+        n=columns["n"].astype(np.int32),
+        pixel=columns["pixel"].astype(np.int32),
+        hull_offsets=offsets,
+        hull_k=k.astype(np.int32),
+        hull_error=error,
+        meta=meta,
+    )
 
 
 def _levels(dump: FragmentDump, curves: Curves, hulls: Hulls, budgets: Sequence[int]) -> tuple[Level, ...]:
     scored = {int(budget) for budget in budgets}
-    usable = int(hulls.lengths().sum(dtype=np.int64))
+    usable = int(hulls.steps()[1].sum(dtype=np.int64))
     last = int(np.minimum(dump.counts, hulls.k_min).sum()) + int(LAST_SHARE * usable)
-    wanted = sorted({*(int(share * dump.total) for share in SHARES), last, *scored})
-    short = [budget for budget in wanted if 0 < budget < dump.total]
+    wanted = (*(int(share * dump.total) for share in SHARES), last, *scored)
+    short = [budget for budget in needed_budgets(wanted, dump.total) if budget > 0]
     return tuple(
         Level(
             budget=found.budget,
@@ -248,34 +321,3 @@ def _levels(dump: FragmentDump, curves: Curves, hulls: Hulls, budgets: Sequence[
         )
         for found in allocate_curves(dump, curves, short, "optimal", hulls)
     )
-
-
-def _tensors(shard: Shard) -> dict[str, NDArray[np.generic]]:
-    names = ("features", "n", "pixel", "hull_offsets", "hull_k", "hull_error")
-    return {name: np.ascontiguousarray(getattr(shard, name)) for name in names}
-
-
-def _serialised(shard: Shard) -> bytes:
-    tensors, view = _tensors(shard), shard.meta.model_dump_json()
-    about = json.dumps({"sha256": _digest(tensors, view), "view": view})
-    return bytes(save(tensors, metadata={"shard": about}))  # one key: the format keeps no order of several
-
-
-def _digest(tensors: dict[str, NDArray[np.generic]], view: str) -> str:
-    hasher = hashlib.sha256(view.encode())
-    for name, tensor in sorted(tensors.items()):
-        hasher.update(json.dumps([name, tensor.dtype.str, tensor.shape]).encode())
-        hasher.update(np.ascontiguousarray(tensor).tobytes())
-    return hasher.hexdigest()
-
-
-def _write_atomically(path: Path, content: bytes) -> None:
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        with partial.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)

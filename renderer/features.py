@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.fragments import FragmentDump
+from schemas.problem import Problem
 
 TEXELS: Final = 7
 SUMS: Final[tuple[str, ...]] = (
@@ -109,7 +110,15 @@ def gather(dump: FragmentDump) -> NDArray[np.float32]:
 
     Returns:
         float32 [P, 28], columns `SUMS`; accumulated in float64. Rows of pixels without fragments are zero.
+
+    Raises:
+        Problem: A depth is not finite.
     """
+    if not np.isfinite(dump.depth).all():
+        raise Problem(
+            "The fragment dump has depths that are not finite.",
+            "Look for NaN or infinite points in the scene, and render the view again.",
+        )
     sums = np.zeros((dump.pixels, len(SUMS)), dtype=np.float32)
     _gather(dump.offsets, dump.rgba, dump.depth, dump.background, sums)
     return sums

@@ -10,6 +10,7 @@ from pathlib import Path
 from services import pipeline
 from services.inline import InlineRunner
 from services.local import open_local
+from services.local_datasets import write_dataset
 from services.measured import Measured
 from services.options import BuildOptions
 from services.pipeline import Built
@@ -21,7 +22,7 @@ from services.stages.report import Evaluation, write
 
 
 def build(options: BuildOptions, progress: Progress) -> BuildResult:
-    """From USD scenes to a published bundle and a report. What exists already is not made again.
+    """From USD scenes to a data set, a published bundle and a report. What exists already is not made again.
 
     Args:
         options: What to build.
@@ -38,6 +39,8 @@ def build(options: BuildOptions, progress: Progress) -> BuildResult:
             if options.views is not None and not scene.listed:
                 progress.note(f"{options.views} has no views of {path}: its own cameras or sampled views are used.")
         built = pipeline.build(plan, runner)
+        dataset = options.state / "datasets" / options.name
+        write_dataset(dataset, built.views, runner.store)
         report = options.state / "reports" / options.name / PAGE
         if runner.worked or not report.is_file():
             with progress.stage("report", 1) as stage:
@@ -45,6 +48,7 @@ def build(options: BuildOptions, progress: Progress) -> BuildResult:
                 stage.advance(1)
     return BuildResult(
         report=report,
+        dataset=dataset,
         registry=built.registered,
         held_out=tuple(scene.label for scene in built.scenes if scene.held_out),
         measurements=tuple(m for view in built.evaluated for m in view.measurements),

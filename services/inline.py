@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from schemas.skips import LABELLED_VIEWS
 from services.measured import Measured
 from services.progress import Progress, Stage
 from services.registry import Registry
@@ -30,7 +31,7 @@ def skipped_title(task: Task) -> str:
     titles: dict[StageName, str] = {
         "scene": "scenes already read",
         "render": "views already captured",
-        "label": "views already labelled",
+        "label": LABELLED_VIEWS,
         "train": "models already trained",
         "export": "bundles already exported",
         "evaluate": f"{task.params.get('kind')} pictures already rendered",

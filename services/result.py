@@ -14,6 +14,7 @@ class BuildResult(BaseModel):
 
     Attributes:
         report: The HTML report.
+        dataset: Folder of the data set: index and shards.
         registry: What became of the bundle.
         held_out: Labels of the scenes that were evaluated on and not trained on; empty if there was only one scene.
         measurements: Of all techniques, views and budgets.
@@ -25,6 +26,7 @@ class BuildResult(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     report: Path
+    dataset: Path
     registry: RegistryResult
     held_out: tuple[str, ...]
     measurements: tuple[Measurement, ...]

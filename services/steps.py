@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from schemas.measurement import Certificate, Measurement, TrainingPoint
 from schemas.problem import ExitCode, Problem
+from schemas.skips import OPAQUE_SCENES, OPAQUE_VIEWS
 from schemas.view import View
 from services.plan import Plan, PlannedScene
 from services.records import Bundle, EvaluatedView, LabelledView, RenderedView, SceneEntry
@@ -35,27 +36,24 @@ def render_views(plan: Plan, runner: Runner, scenes: Sequence[SceneEntry]) -> tu
         if facts is None:
             continue
         if facts["total"] == 0:
-            runner.progress.skipped("views without a transparent pixel")
+            runner.progress.skipped(OPAQUE_VIEWS)
             continue
         rendered.append(RenderedView(scene, view, task, facts["total"]))
-    _require_views(scenes, rendered)
-    for factor, fragments in zip(plan.factors, plan.budgets, strict=True):
-        exact = sum(fragments >= view.total for view in rendered)
-        if exact:
-            what = f"views that a budget of {factor:g} holds completely: exact without predictor"
-            runner.progress.skipped(what, exact)
+    _require_views(runner, scenes, rendered)
     return tuple(rendered)
 
 
 def label_views(plan: Plan, runner: Runner, views: Sequence[RenderedView]) -> tuple[LabelledView, ...]:
-    """Labels of all views: all budgets of a view in one task."""
+    """Labels of all views: all budgets of a view in one task. What took no part in them is counted as skipped."""
     asked = [tasks.label_task(plan, view) for view in views]
-    made = zip(views, asked, _map(runner, "label", asked), strict=True)
-    labelled = [
-        LabelledView(view, task, facts, _certificates(plan, view, facts))
-        for view, task, facts in made
-        if facts is not None
-    ]
+    labelled = []
+    for view, task, facts in zip(views, asked, _map(runner, "label", asked), strict=True):
+        if facts is None:
+            continue
+        for what, count in facts["skips"].items():
+            if count:
+                runner.progress.skipped(what, count)
+        labelled.append(LabelledView(view, task, facts, _certificates(plan, view, facts)))
     return tuple(labelled)
 
 
@@ -186,28 +184,48 @@ def _transparent(runner: Runner, entries: Sequence[SceneEntry]) -> tuple[SceneEn
     """The scenes that have something transparent; an opaque one among them is left out, and that is said.
 
     Raises:
-        Problem: None is left, or none to train on, or none of those held out.
+        Problem: None is left, or none to train on.
     """
     opaque = [entry for entry in entries if entry.opaque]
     kept = [entry for entry in entries if not entry.opaque]
     if opaque:
-        names = ", ".join(entry.label for entry in opaque)
-        why = f"Nothing in {names} is transparent, so there is nothing to allocate."
+        why = f"Nothing in {_names(opaque)} is transparent, so there is nothing to allocate."
         remedy = "Make every surface of all scenes transparent with --alpha 0.33, or name other scenes."
-        if {entry.held_out for entry in kept} != {entry.held_out for entry in entries}:
+        if _nothing_to_learn(entries, kept):
             raise Problem(why, remedy)
-        runner.progress.skipped("opaque scenes", len(opaque))
-        runner.progress.note(f"{why} Left out. {remedy}")
+        runner.progress.skipped(OPAQUE_SCENES, len(opaque))
+        runner.progress.note(f"{why} Left out{_unscored(entries, kept)}. {remedy}")
     return tuple(kept)
 
 
-def _require_views(scenes: Sequence[SceneEntry], views: Sequence[RenderedView]) -> None:
-    seen = {view.scene.held_out for view in views}
-    for held_out, purpose in ((False, "train on"), (True, "evaluate on")):
-        names = ", ".join(scene.label for scene in scenes if scene.held_out == held_out)
-        if names and held_out not in seen:
-            raise Problem(
-                f"No view of {names} shows a transparent surface, so there is nothing to {purpose}.",
-                "Give views with --views, choose --holdout otherwise, or add scenes.",
-                ExitCode.CHECK_FAILED,
-            )
+def _require_views(runner: Runner, scenes: Sequence[SceneEntry], views: Sequence[RenderedView]) -> None:
+    """Says that a scene takes no part because none of its views shows anything transparent.
+
+    Raises:
+        Problem: None is left, or none to train on.
+    """
+    seen = {view.scene.label for view in views}
+    kept = [scene for scene in scenes if scene.label in seen]
+    unseen = [scene for scene in scenes if scene.label not in seen]
+    if not unseen:
+        return
+    why = f"No view of {_names(unseen)} shows a transparent surface"
+    remedy = "Give views with --views, choose --holdout otherwise, or add scenes."
+    if _nothing_to_learn(scenes, kept):
+        raise Problem(f"{why}, so there is nothing to train on.", remedy, ExitCode.CHECK_FAILED)
+    runner.progress.note(f"{why}. Left out{_unscored(scenes, kept)}. {remedy}")
+
+
+def _nothing_to_learn(asked: Sequence[SceneEntry], kept: Sequence[SceneEntry]) -> bool:
+    """Whether none is left of all scenes, or of those to train on."""
+    return not kept or (all(scene.held_out for scene in kept) and not all(scene.held_out for scene in asked))
+
+
+def _unscored(asked: Sequence[SceneEntry], kept: Sequence[SceneEntry]) -> str:
+    """What it means if no held-out scene is left."""
+    lost = any(scene.held_out for scene in asked) and not any(scene.held_out for scene in kept)
+    return ", and no scene remains that was held out: nothing is scored" if lost else ""
+
+
+def _names(scenes: Sequence[SceneEntry]) -> str:
+    return ", ".join(scene.label for scene in scenes)

@@ -12,6 +12,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from labeller.dataset import read_ahead
 from labeller.shards import Shard, read_shard
 from schemas.problem import ExitCode, Problem
 
@@ -126,18 +127,20 @@ def lossless_error(pixels: float) -> float:
     return LOSSLESS_MSE * 3.0 * pixels
 
 
-def load_shards(paths: Sequence[Path], assets: Sequence[str]) -> list[ViewData]:
-    """Read label shards.
+def load_shards(paths: Sequence[Path], assets: Sequence[str], threads: int | None = None) -> list[ViewData]:
+    """Read label shards, some at a time in threads: reading, hashing and the segments need no interpreter lock.
 
     Args:
         paths: Shards of `labeller.shards`.
         assets: The asset of each shard.
+        threads: That read; None: one for each core.
 
     Raises:
-        Problem: No shard has a row that a budget could change.
+        Problem: No shard has a row that a budget could change, or one is missing or damaged; it is named.
     """
-    views = [view_data(read_shard(path), asset) for path, asset in zip(paths, assets, strict=True)]
-    views = [view for view in views if view.rows]
+    shards = zip(paths, assets, strict=True)
+    read = read_ahead(lambda item: view_data(read_shard(item[0]), item[1]), shards, threads)
+    views = [view for view in read if view.rows]
     if not views:
         raise Problem(
             "There is nothing to learn: no pixel's colour depends on the budget.",
@@ -282,7 +285,7 @@ def _pad(
             out_lengths[i, j] = lengths[first + j]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _segments(
     hull_offsets: NDArray[np.int64], hull_k: NDArray[np.int32], hull_error: NDArray[np.float32]
 ) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]:

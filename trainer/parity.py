@@ -14,32 +14,12 @@ from renderer.context import describe
 from renderer.features import FEATURES
 from renderer.onnx_network import OnnxNetwork
 from schemas.bundle import GLSL, ONNX, ParityReport
-from schemas.problem import ExitCode, Problem
+from trainer.glsl_network import CHUNK, glsl_outputs, refused
 from trainer.models import GainCurve
 from trainer.weights import Weights
 
 TOLERANCE: Final = 1e-5
 """Largest difference, relative to max(1, |value|)."""
-
-CHUNK: Final = 1 << 17
-"""Rows at a time: 26 features of that many are 14 MB."""
-
-_GROUP: Final = 64
-
-_MAIN: Final = f"""
-layout(local_size_x = {_GROUP}) in;
-layout(std430, binding = 0) readonly buffer Inputs {{ float inputs[]; }};
-layout(std430, binding = 1) writeonly buffer Outputs {{ vec2 outputs[]; }};
-uniform uint rows;
-
-void main() {{
-    uint row = gl_GlobalInvocationID.x;
-    if (row >= rows) return;
-    float x[DIAPHANE_FEATURES];
-    for (int i = 0; i < DIAPHANE_FEATURES; ++i) x[i] = inputs[row * uint(DIAPHANE_FEATURES) + uint(i)];
-    outputs[row] = diaphane_predict(x);
-}}
-"""
 
 
 def check(
@@ -58,13 +38,13 @@ def check(
         Problem: There are no rows, a value is not finite, GLSL does not compile, or a form differs.
     """
     if features.ndim != 2 or features.shape[1] != len(FEATURES) or not len(features):
-        raise _refused(f"features have the shape {features.shape}, not [rows, {len(FEATURES)}]")
+        raise refused(f"features have the shape {features.shape}, not [rows, {len(FEATURES)}]")
     if not np.isfinite(features).all():
-        raise _refused("a feature is not finite")
+        raise refused("a feature is not finite")
     inputs = np.ascontiguousarray(features[:, weights.columns])
     truth = torch_outputs(weights, inputs)
     if not np.isfinite(truth).all():
-        raise _refused("the network's output is not finite")
+        raise refused("the network's output is not finite")
     report = ParityReport(
         count=len(inputs),
         tolerance=tolerance,
@@ -73,7 +53,7 @@ def check(
         driver=describe(ctx),
     )
     if max(report.torch_onnx, report.torch_glsl) > tolerance:
-        raise _refused(
+        raise refused(
             f"the forms differ by {report.torch_onnx:.2g} (ONNX) and {report.torch_glsl:.2g} (GLSL on {report.driver}) "
             f"from torch, more than {tolerance:g}"
         )
@@ -91,44 +71,7 @@ def torch_outputs(weights: Weights, inputs: NDArray[np.float32]) -> NDArray[np.f
     return np.concatenate(parts)
 
 
-def glsl_outputs(path: Path, inputs: NDArray[np.float32], ctx: moderngl.Context) -> NDArray[np.float32]:
-    """The same from a GLSL file in a compute shader.
-
-    Raises:
-        Problem: The driver does not compile it.
-    """
-    try:
-        shader = ctx.compute_shader(f"#version 450\n{path.read_text()}{_MAIN}")
-    except moderngl.Error as reason:
-        raise _refused(f"{path.name} does not compile: {reason}") from reason
-    source = ctx.buffer(reserve=min(CHUNK, len(inputs)) * inputs.shape[1] * 4)
-    target = ctx.buffer(reserve=min(CHUNK, len(inputs)) * 8)
-    parts = []
-    try:
-        for start in range(0, len(inputs), CHUNK):
-            chunk = inputs[start : start + CHUNK]
-            source.write(chunk.tobytes())
-            source.bind_to_storage_buffer(0)
-            target.bind_to_storage_buffer(1)
-            shader["rows"] = len(chunk)
-            shader.run(-(-len(chunk) // _GROUP))
-            ctx.memory_barrier()
-            parts.append(np.frombuffer(target.read(len(chunk) * 8), dtype=np.float32).reshape(-1, 2))
-    finally:
-        for resource in (source, target, shader):
-            resource.release()
-    return np.concatenate(parts)
-
-
 def _difference(truth: NDArray[np.float32], other: NDArray[np.float32], form: str) -> float:
     if not np.isfinite(other).all():
-        raise _refused(f"the output of {form} is not finite")
+        raise refused(f"the output of {form} is not finite")
     return float((np.abs(other.astype(np.float64) - truth) / np.maximum(1.0, np.abs(truth))).max())
-
-
-def _refused(why: str) -> Problem:
-    return Problem(
-        f"The bundle is not written: {why}.",
-        "Train again, with another seed if it stays so; if only GLSL differs, update the GL driver.",
-        ExitCode.CHECK_FAILED,
-    )

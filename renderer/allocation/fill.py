@@ -36,9 +36,7 @@ def budget_fill(weights: NDArray[np.floating], n: NDArray[np.integer], budget: i
     Raises:
         ValueError: If a weight is negative or not finite, or if the budget is below `sum min(k_min, n)`.
     """
-    weights = np.asarray(weights, dtype=np.float64)
-    if len(weights) and not (np.isfinite(weights).all() and weights.min() >= 0.0):
-        raise ValueError("weights must be finite and not negative")
+    weights = _checked(weights)
     counts = np.asarray(n, dtype=np.int32)
     largest = float(weights.max(initial=0.0))
     # Weights below 1e-200 of the largest count as zero, so that no scale can overflow.
@@ -85,15 +83,25 @@ def paper_fill(weights: NDArray[np.floating], budget: int) -> NDArray[np.int32]:
     """Eq. 3 of DHOIT as printed, `floor(w / sum w * F)`: no clamp (k may exceed n), the remainder is lost.
 
     Args:
-        weights: [P], >= 0.
+        weights: [P], >= 0 and finite.
         budget: F, fragments to spend.
 
     Returns:
         int32 [P], slots reserved for each pixel.
+
+    Raises:
+        ValueError: If a weight is negative or not finite.
     """
-    weights = np.asarray(weights, dtype=np.float64)
+    weights = _checked(weights)
     total = float(weights.sum())
     return np.asarray(np.floor(weights * (budget / total if total > 0.0 else 0.0)), dtype=np.int32)
+
+
+def _checked(weights: NDArray[np.floating]) -> NDArray[np.float64]:
+    numbers = np.asarray(weights, dtype=np.float64)
+    if len(numbers) and not (np.isfinite(numbers).all() and numbers.min() >= 0.0):
+        raise ValueError("weights must be finite and not negative")
+    return numbers
 
 
 def _fill(

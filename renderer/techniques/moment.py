@@ -43,7 +43,8 @@ class Moment:
 
     Float32 pictures differ from float64 ones by less than 1e-5 in linear light, but for up to about 1e-3 in less than
     one pixel of a thousand, where two or three tight groups of fragments are far apart: the moments' rounding is as
-    large there as what tells the fragments of a group apart.
+    large there as what tells the fragments of a group apart. Pixels of three fragments of which two are close are such;
+    the worst of 170,000 was 1.4e-2.
 
     What differs from the paper: depths are warped logarithmically, as there, but between the nearest and the farthest
     fragment of the pixel instead of the camera's planes. Moments of an affine image of x tell the same, so without bias

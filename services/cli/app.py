@@ -20,6 +20,7 @@ from typer.exceptions import Abort, Exit, TyperException
 from schemas.problem import ExitCode, Problem
 from services.cli import (
     build,
+    dataset,
     datasets,
     dump,
     health,
@@ -34,6 +35,7 @@ from services.cli import (
     scene,
     scenes,
     serve,
+    stress,
     worker,
     workers,
 )
@@ -51,11 +53,13 @@ app.command("render")(render.render)
 app.command("dump")(dump.dump)
 app.add_typer(scene.app, name="scene")
 app.command("samples")(samples.samples)
+app.command("stress")(stress.stress)
 app.command("serve")(serve.serve)
 app.command("worker")(worker.worker)
 app.command("retrain")(retrain.retrain)
 app.add_typer(scenes.app, name="scenes")
 app.add_typer(jobs.app, name="jobs")
+app.add_typer(dataset.app, name="dataset")
 app.add_typer(datasets.app, name="datasets")
 app.command("measurements")(measurements.measurements)
 app.add_typer(models.app, name="models")

@@ -94,13 +94,15 @@ def _show(options: BuildOptions, result: BuildResult) -> None:
         console.print(table)
         console.print(summary.sentence(held_out), markup=False)
     else:
-        console.print("No scene was held out, so nothing is proven: give a second scene.", markup=False)
+        why = "No view of a scene that was held out was scored, so nothing is proven: give a second transparent scene."
+        console.print(why, markup=False)
     if result.skipped:
-        skipped = ", ".join(f"{count} {what}" for what, count in result.skipped.items())
+        skipped = ", ".join(f"{count:,} {what}" for what, count in result.skipped.items())
         console.print(f"Skipped: {skipped}.", markup=False)
     if not result.worked:
         console.print("Nothing had to be done: every artifact was there already.", markup=False)
     console.print(f"{result.registry.reference}: {result.registry.reason}", markup=False)
     console.print(f"Bundle: {result.registry.folder}", markup=False)
+    console.print(f"Data set: {result.dataset}", markup=False)
     console.print(f"Report: {result.report}", markup=False)
     console.print(f"[dim]{result.seconds:.1f} s, seed {options.seed}[/]")

@@ -148,7 +148,7 @@ def show_job(job: dict[str, Any], *, as_json: bool) -> None:
         rows = [(s["stage"], *(s[c] for c in columns), seconds(s["eta_seconds"])) for s in job["stages"]]
         print_columns(("stage", *columns, "to go"), rows)
     if job.get("skipped"):
-        print("Skipped: " + ", ".join(f"{count} {plain(what)}" for what, count in job["skipped"].items()) + ".")
+        print("Skipped: " + ", ".join(f"{count:,} {plain(what)}" for what, count in job["skipped"].items()) + ".")
     for name, value in (job.get("result") or {}).items():
         if isinstance(value, str | int | float):
             print(f"{plain(name)}: {plain(value)}")

@@ -205,7 +205,7 @@ def _compare(remote: Remote, job: dict[str, Any], spec: Mapping[str, Any], champ
 
     notes = []
     if job.get("skipped"):
-        counts = ", ".join(f"{count} {what}" for what, count in job["skipped"].items())
+        counts = ", ".join(f"{count:,} {what}" for what, count in job["skipped"].items())
         notes.append(f"Skipped, because it was there already: {code(counts)}.")
     for task in remote.tasks(job["id"], _SHOWN_TASKS, state="quarantined"):
         problem = task.get("problem") or {}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +15,12 @@ from labeller.curves import error_curves
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
 from labeller.shards import write_shard
+from labeller.skips import budget_skips, needed_budgets, pixel_skips
 from renderer.dump import read_dump
 from services.stages.desk import SHARD, Desk, save_facts
-from services.store import file_sha256
 from services.tasks import Report, Task
+
+Answer = TypeVar("Answer")
 
 _OPTIMAL = "optimal.safetensors"
 
@@ -34,30 +38,45 @@ def optimal(folder: Path, fragments: int) -> NDArray[np.int32]:
 def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
     """Writes the optimal allocations, the shard, and the errors of all rules."""
     params = task.params
-    budgets = tuple(params["budgets"])
     dump = read_dump(desk.artifact(task, "render"))
     curves = error_curves(dump, params["tail"], params["g"], params["metric"])
     hulls = lower_hulls(curves, 1)
     report(0.3, f"curves of {dump.total:,} fragments")
+    budgets = needed_budgets(params["budgets"], dump.total)
     made = {rule: allocate_curves(dump, curves, budgets, rule, hulls=hulls) for rule in RULES}
     # k rarely exceeds 255, never 65535 at any budget that is not exact; 16 bits halve the artifact.
     save_file(
-        {str(a.budget): np.minimum(a.k, 65535).astype(np.uint16) for a in made["optimal"] if not a.exact} or _NOTHING,
+        {str(a.budget): np.minimum(a.k, 65535).astype(np.uint16) for a in made["optimal"]} or _NOTHING,
         folder / _OPTIMAL,
     )
     report(0.8, f"{len(RULES)} rules at {len(budgets)} budgets")
-    shard = folder / SHARD
-    write_shard(shard, dump, curves, hulls, budgets, seed=params["seed"])
+    written = write_shard(folder / SHARD, dump, curves, hulls, budgets, seed=params["seed"])
     facts = {
-        "errors": {rule: [a.error for a in allocations] for rule, allocations in made.items()},
-        "certificates": [_certificate(a) for a in made["optimal"]],
-        "shard": {"sha256": file_sha256(shard), "bytes": shard.stat().st_size},
+        "errors": {rule: _answers(params["budgets"], allocations, _error, 0.0) for rule, allocations in made.items()},
+        "certificates": _answers(params["budgets"], made["optimal"], _certificate, _EXACT),
+        "shard": {"sha256": written.sha256, "bytes": written.bytes},
+        "skips": {**pixel_skips(dump, hulls), **budget_skips(params["budgets"], dump.total)},
     }
     save_facts(folder, facts)
 
 
 _NOTHING = {"none": np.zeros(1, dtype=np.uint16)}
 """A safetensors file must hold something."""
+
+_EXACT = {"error": 0.0, "bound": 0.0, "gap": 0.0}
+"""The certificate of a budget that holds all fragments."""
+
+
+def _answers(
+    budgets: Sequence[int], allocations: Sequence[Allocation], answer: Callable[[Allocation], Answer], complete: Answer
+) -> list[Answer]:
+    """An answer for each budget in the order asked: the allocation's, or that of a budget that holds everything."""
+    found = {allocation.budget: answer(allocation) for allocation in allocations}
+    return [found.get(budget, complete) for budget in budgets]
+
+
+def _error(a: Allocation) -> float:
+    return a.error
 
 
 def _certificate(a: Allocation) -> dict[str, float]:

@@ -39,7 +39,7 @@ _SOURCES: Mapping[StageName, tuple[str, ...]] = {
         "services.stages.train",
     ),
     "export": (
-        *(f"trainer.{name}" for name in ("bundle", "export_glsl", "export_onnx", "parity")),
+        *(f"trainer.{name}" for name in ("bundle", "export_glsl", "export_onnx", "glsl_network", "parity")),
         "renderer.onnx_network",
         "schemas.bundle",
         "services.stages.export",

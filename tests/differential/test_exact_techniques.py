@@ -9,7 +9,7 @@ import moderngl
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support import scenes, stacks
+from support import scenes
 
 from renderer.capture import capture
 from renderer.frame import Frame
@@ -29,6 +29,7 @@ from schemas.limits import Limits
 from schemas.problem import Problem
 from schemas.scene import SceneArrays
 from schemas.view import View
+from services.stress import gl_stacks as stacks
 
 EXACT: dict[str, tuple[Technique, ModuleType]] = {
     technique.name: (technique, twin)

@@ -9,7 +9,6 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
-from support.stacks import STRIDE, VIEW, extreme_stacks, size, stack_scene
 from support.training import random_weights
 
 from labeller.curves import composite
@@ -23,6 +22,7 @@ from renderer.techniques.ordered import capture_ordered
 from schemas.bundle import Provenance, TailSpec
 from schemas.fragments import FragmentDump
 from schemas.tail import TAILS, TailName
+from services.stress.gl_stacks import STRIDE, VIEW, extreme_stacks, size, stack_scene
 from trainer.bundle import Description, export_bundle
 
 LAYERS = 4096

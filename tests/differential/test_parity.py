@@ -16,7 +16,8 @@ from schemas.bundle import FEATURE_LIMIT, GLSL, ONNX
 from schemas.problem import Problem
 from trainer.export_glsl import glsl_source
 from trainer.export_onnx import OPSET, onnx_model
-from trainer.parity import CHUNK, check, glsl_outputs, torch_outputs
+from trainer.glsl_network import CHUNK, glsl_outputs
+from trainer.parity import check, torch_outputs
 from trainer.weights import Weights
 
 

@@ -9,7 +9,6 @@ import moderngl
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support import stacks
 from support.scenes import SIZE, VIEW, shells
 
 from labeller.curves import composite
@@ -22,6 +21,7 @@ from renderer.techniques.skips import EMPTY_TILES
 from schemas.fragments import FragmentDump
 from schemas.limits import LIMITS
 from schemas.problem import Problem
+from services.stress import gl_stacks as stacks
 
 Twin = Callable[[FragmentDump], NDArray[np.float64]]
 

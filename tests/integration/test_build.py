@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import json
+import shutil
 import time
 from pathlib import Path
 
 import pytest
 
+from labeller.dataset import open_dataset
 from renderer.samples import write_samples
 from schemas.bundle import load_manifest
 from schemas.problem import Problem
@@ -15,7 +18,7 @@ from services import steps, summary
 from services.build import build
 from services.local import open_local
 from services.options import BuildOptions
-from services.progress import SilentProgress
+from services.progress import PlainProgress, SilentProgress
 from services.result import BuildResult
 
 TRAIN = ("nested_shells.usda", "torus_knots.usdc")
@@ -95,6 +98,30 @@ def test_report_stands_alone(built: BuildResult) -> None:
     assert "data:image/webp;base64," in html
 
 
+def test_the_data_set_can_be_copied_and_read_by_itself(built: BuildResult, state: Path, tmp_path: Path) -> None:
+    assert built.dataset == state / "datasets" / "small"
+    dataset = open_dataset(Path(shutil.copytree(built.dataset, tmp_path / "elsewhere")))
+    assert {entry.asset for entry in dataset.index.shards if entry.split == "held-out"} == {"voxel_town"}
+    trained = list(dataset.shards("train"))
+    assert {entry.asset for entry, _ in trained} == {"nested_shells", "torus_knots"}
+    assert len(trained) == 6
+    for entry, shard in trained:
+        assert dataset.check(entry).segments == shard.segments > 0
+        assert entry.source.camera.name == entry.source.view
+        assert (shard.meta.width, shard.meta.height) == (176, 118)
+
+
+def test_a_shard_that_was_lost_is_there_again_after_the_same_command(
+    built: BuildResult, samples: Path, state: Path
+) -> None:
+    (first, *_) = open_dataset(built.dataset).index.shards
+    (built.dataset / first.file).unlink()
+    with pytest.raises(Problem, match="is missing"):
+        open_dataset(built.dataset)
+    assert not build(options(samples, state), SilentProgress()).worked
+    open_dataset(built.dataset).check(first)
+
+
 def test_same_command_again_does_nothing_and_is_quick(built: BuildResult, samples: Path, state: Path) -> None:
     started = time.monotonic()
     again = build(options(samples, state), SilentProgress())
@@ -113,6 +140,7 @@ def test_an_added_scene_is_the_only_one_rendered_and_labelled(built: BuildResult
     assert {stage: after[stage] - before[stage] for stage in before} == {"render": 3, "label": 3}
     assert result.skipped["baseline pictures already rendered"] == 3
     assert result.registry.reference == "small@1.1.0"
+    assert {entry.asset for entry in open_dataset(result.dataset).index.shards} >= {"bottles", "voxel_town"}
 
 
 def test_interrupted_build_continues(samples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -131,7 +159,8 @@ def test_interrupted_build_continues(samples: Path, tmp_path: Path, monkeypatch:
 
 def test_budget_beyond_all_fragments_is_exact_and_says_so(samples: Path, tmp_path: Path) -> None:
     result = build(
-        options(samples, tmp_path, scenes=(TRAIN[0], HELD_OUT), budgets=(1.0, 64.0), steps=50), SilentProgress()
+        options(samples, tmp_path, scenes=(TRAIN[0], HELD_OUT), budgets=(1.0, 1.0000001, 64.0), steps=50),
+        SilentProgress(),
     )
     beyond = [m for m in result.measurements if m.budget_factor == 64.0]
     assert beyond
@@ -140,7 +169,34 @@ def test_budget_beyond_all_fragments_is_exact_and_says_so(samples: Path, tmp_pat
         assert m.mse == 0.0
         assert m.skipped is not None
         assert "exact" in m.skipped
-    assert result.skipped["views that a budget of 64 holds completely: exact without predictor"] == 6
+    assert result.skipped["budgets that hold all fragments of a view"] == 6
+    assert result.skipped["budgets given more than once"] == 6
+    for what in ("pixels that k_min covers", "pixels already exact at k_min"):
+        assert result.skipped[what] > 0
+        assert what in result.report.read_text(encoding="utf-8")
+
+
+def test_an_opaque_scene_that_is_held_out_by_itself_is_not_scored(samples: Path, tmp_path: Path) -> None:
+    solid = tmp_path / "solid.usda"
+    solid.write_text('#usda 1.0\n(defaultPrim = "C")\ndef Cube "C" {}\n', encoding="utf-8")
+    wanted = BuildOptions(
+        scenes=(samples / TRAIN[0], solid),
+        name="unscored",
+        budgets=(1.0,),
+        width=64,
+        height=48,
+        steps=20,
+        state=tmp_path / "state",
+    )
+    assert wanted.holdout == (solid,), "the automatic choice"
+    log = io.StringIO()
+    result = build(wanted, PlainProgress(log))
+    assert "Nothing in solid is transparent" in log.getvalue()
+    assert "nothing is scored" in log.getvalue()
+    assert result.skipped["opaque scenes"] == 1
+    assert result.registry.score is None
+    assert {m.scene for m in result.measurements} == {"nested_shells"}
+    assert "No scene was held out" in result.report.read_text(encoding="utf-8")
 
 
 def test_opaque_scene_is_refused_with_the_way_out(tmp_path: Path) -> None:

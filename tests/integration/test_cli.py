@@ -65,6 +65,7 @@ def succeed(options: BuildOptions, progress: Progress) -> BuildResult:
         stage.advance()
     return BuildResult(
         report=options.state / "report.html",
+        dataset=options.state / "datasets" / options.name,
         registry=RegistryResult(
             reference=f"{options.name}@1.0.0", folder="folder", champion=True, reason="It is the first version."
         ),

@@ -10,7 +10,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from support.drivers import LLVMPIPE, PACKAGES, ROOT, ZINK, environment, facts, lavapipe_installed
+from support.drivers import ROOT, environment, facts, lavapipe_installed
+
+from services.stress.gl_drivers import LLVMPIPE, ZINK
 
 ONE_PASS = "tests/differential/test_chain_one_pass.py"
 TECHNIQUES = sorted(
@@ -20,7 +22,7 @@ TECHNIQUES = sorted(
 )
 
 pytestmark = pytest.mark.skipif(
-    not lavapipe_installed(), reason=f"there is no Vulkan driver for zink: apt-get install {PACKAGES}"
+    not lavapipe_installed(), reason=f"there is no Vulkan driver for zink: apt-get install {ZINK.packages}"
 )
 
 

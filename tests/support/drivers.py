@@ -11,7 +11,6 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +19,11 @@ from renderer.context import describe, gl_context
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.techniques.chain import one_pass_available
+from services.stress import gl_drivers
+from services.stress.gl_drivers import Driver
 from support.scenes import SIZE, VIEW, shells
 
 ROOT = Path(__file__).parents[2]
-LLVMPIPE = {"GALLIUM_DRIVER": "llvmpipe", "LIBGL_ALWAYS_SOFTWARE": "1"}
-ZINK = {"GALLIUM_DRIVER": "zink", "MESA_LOADER_DRIVER_OVERRIDE": "zink", "LIBGL_ALWAYS_SOFTWARE": "1"}
-PACKAGES = "mesa-vulkan-drivers libvulkan1"
 
 _ICDS = ("/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d")
 
@@ -39,13 +37,13 @@ def lavapipe_installed() -> bool:
     return any(list(Path(folder).glob("lvp_icd*.json")) for folder in _ICDS)
 
 
-def environment(driver: Mapping[str, str], runtime: Path) -> dict[str, str]:
-    """The environment of a process with this driver."""
-    given = {**os.environ, **driver, "XDG_RUNTIME_DIR": str(runtime)}
-    return {**given, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")])}
+def environment(driver: Driver, runtime: Path) -> dict[str, str]:
+    """The environment of a test process with this driver."""
+    made = gl_drivers.environment(driver, runtime)
+    return {**made, "PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests")])}
 
 
-def facts(driver: Mapping[str, str], runtime: Path) -> dict[str, Any]:
+def facts(driver: Driver, runtime: Path) -> dict[str, Any]:
     """What a process with this driver prints."""
     command = [sys.executable, "-m", "support.drivers"]
     done = subprocess.run(command, env=environment(driver, runtime), cwd=ROOT, capture_output=True, text=True)

@@ -20,8 +20,10 @@ void main() {
         float a = opacity_of(word);
         uvec2 carried_key = uvec2(depth[j], word);
         vec4 carried = vec4(a * decoded(word), 1.0 - a);
+        bool placed = false;  // all that is behind it moves, also a layer that is as deep as the next one
         for (int i = 0; i < NODES; ++i) {
-            if (is_nearer(carried_key, key[i])) {
+            placed = placed || is_nearer(carried_key, key[i]);
+            if (placed) {
                 uvec2 farther_key = key[i];
                 vec4 farther = layer[i];
                 key[i] = carried_key;

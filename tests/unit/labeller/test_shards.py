@@ -1,20 +1,27 @@
-"""Label shards: what a row holds, and that damage is found."""
+"""Label shards: what a row holds, what of a file is read, and that damage is found."""
 
 from __future__ import annotations
 
+import json
 import math
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
+from safetensors.numpy import load_file
 from support.dumps import random_dump
+from support.shards import random_shard
 
+from labeller.columns import COLUMNS
 from labeller.curves import error_curves
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
-from labeller.shards import Shard, read_shard, stratified_sample, write_shard
+from labeller.shard_file import open_columns, write_columns
+from labeller.shards import Shard, read_rows, read_shard, write_shard
 from renderer.features import FEATURES, derive, gather
-from schemas.problem import Problem
+from schemas.problem import ExitCode, Problem
 
 DUMP = random_dump(40, 30, 8, seed=1)
 CURVES = error_curves(DUMP)
@@ -89,8 +96,10 @@ def test_a_changed_byte_is_found_and_the_file_is_named(path: Path, tmp_path: Pat
     content[int(where * len(content))] ^= 0x11
     damaged = tmp_path / "damaged.safetensors"
     damaged.write_bytes(content)
-    with pytest.raises(Problem, match=r"damaged\.safetensors is damaged"):
+    with pytest.raises(Problem, match=r"damaged\.safetensors is damaged") as caught:
         read_shard(damaged)
+    assert caught.value.code is ExitCode.CHECK_FAILED
+    assert "run the same command again" in caught.value.remedy
 
 
 @pytest.mark.parametrize("size", [0, 7, 5000])
@@ -100,14 +109,120 @@ def test_a_cut_off_file_is_found(path: Path, tmp_path: Path, size: int) -> None:
         read_shard(tmp_path / "cut")
 
 
+def test_a_longer_file_is_found(path: Path, tmp_path: Path) -> None:
+    (tmp_path / "long").write_bytes(path.read_bytes() + b"\0")
+    with pytest.raises(Problem, match="long is damaged: its length"):
+        read_shard(tmp_path / "long")
+
+
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(Problem, match=r"no label shard .*nowhere"):
         read_shard(tmp_path / "nowhere")
 
 
-def test_the_sample_has_its_share_of_every_n() -> None:
-    n = np.repeat([1, 2, 9], [1000, 500, 50])
-    sample = stratified_sample(np.arange(len(n)), n, 0.2, seed=3)
-    for value, count in ((1, 200), (2, 100), (9, 10)):
-        assert abs(np.count_nonzero(n[sample] == value) - count) <= 1
-    assert np.array_equal(sample, np.unique(sample))
+def test_a_file_of_another_version_says_so(path: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    other.write_bytes(path.read_bytes().replace(b'\\"schema_version\\":2', b'\\"schema_version\\":1'))
+    with pytest.raises(Problem, match="another version of Diaphane"):
+        read_shard(other)
+
+
+def test_the_file_is_plain_safetensors(path: Path, shard: Shard) -> None:
+    tensors = load_file(path)
+    assert set(tensors) == {*COLUMNS, "header_sha256"}
+    for name, column in COLUMNS.items():
+        assert tensors[name].dtype == column.dtype
+    np.testing.assert_array_equal(tensors["features"], shard.features)
+    starts = np.concatenate([[0], np.cumsum(tensors["hull_segments"], dtype=np.int64)])
+    row = int(np.argmax(tensors["n"]))
+    mine = slice(starts[row], starts[row + 1])
+    hull = slice(shard.hull_offsets[row], shard.hull_offsets[row + 1])
+    k = shard.k_min + np.concatenate([[0], np.cumsum(tensors["hull_length"][mine], dtype=np.int64)])
+    np.testing.assert_array_equal(k, shard.hull_k[hull])
+    np.testing.assert_array_equal(np.append(tensors["hull_error"][mine], 0.0), shard.hull_error[hull])
+
+
+def test_a_feature_has_a_meaning() -> None:
+    assert tuple(COLUMNS["features"].fields) == FEATURES
+
+
+def test_a_range_reads_and_verifies_its_own_blocks_alone(tmp_path: Path) -> None:
+    path = tmp_path / "view"
+    random_shard(path, block_rows=16)
+    whole = read_shard(path)
+    content = bytearray(path.read_bytes())
+    size = 8 + int.from_bytes(content[:8], "little")
+    begin = size + json.loads(content[8:size])["features"]["data_offsets"][0]
+    content[begin + 40 * 26 * 4] ^= 1  # row 40 is in the third block
+    path.write_bytes(content)
+    for start, stop in ((0, 32), (16, 17), (48, len(whole.n)), (32, 32)):
+        np.testing.assert_array_equal(read_rows(path, start, stop).features, whole.features[start:stop])
+    for start, stop in ((0, 33), (32, 33), (47, 60)):
+        with pytest.raises(Problem, match="the rows from 32 on do not match"):
+            read_rows(path, start, stop)
+
+
+@pytest.mark.parametrize(("start", "stop"), [(-1, 3), (5, 4), (0, 10**6)])
+def test_rows_that_a_shard_does_not_have_are_refused(path: Path, start: int, stop: int) -> None:
+    with pytest.raises(IndexError, match="view"):
+        read_rows(path, start, stop)
+
+
+def test_a_shard_is_not_taken_for_another(path: Path, tmp_path: Path) -> None:
+    written = random_shard(tmp_path / "other")
+    read_shard(tmp_path / "other", written.header_sha256)
+    for read in (lambda: read_shard(path, written.header_sha256), lambda: read_rows(path, 0, 1, written.header_sha256)):
+        with pytest.raises(Problem, match="not the file that the index names"):
+            read()
+
+
+def test_lists_longer_than_65535_need_wider_columns(tmp_path: Path) -> None:
+    columns = {
+        "features": np.zeros((2, len(FEATURES)), np.float32),
+        "n": np.array([70_000, 2], np.uint32),
+        "pixel": np.array([0, 1], np.uint32),
+        "hull_segments": np.array([2, 0], np.uint32),
+        "hull_length": np.array([69_000, 900], np.uint32),
+        "hull_error": np.array([0.5, 0.25], np.float32),
+    }
+    random_shard(tmp_path / "view")
+    with open_columns(tmp_path / "view") as file:
+        view = file.layout.view
+    write_columns(tmp_path / "wide", columns, view)
+    shard = read_shard(tmp_path / "wide")
+    np.testing.assert_array_equal(shard.n, [70_000, 2])
+    np.testing.assert_array_equal(shard.hull_k, [1, 69_001, 69_901])
+    np.testing.assert_array_equal(shard.hull_error, np.array([0.5, 0.25, 0.0], np.float32))
+    np.testing.assert_array_equal(shard.hull_offsets, [0, 3, 3])
+
+
+def test_readers_see_the_old_shard_or_the_new_one_while_it_is_replaced(tmp_path: Path) -> None:
+    path, stop = tmp_path / "view", threading.Event()
+    kinds = []
+    for seed in (1, 2):
+        random_shard(tmp_path / str(seed), seed)
+        with open_columns(tmp_path / str(seed)) as file:
+            kinds.append((file.read(0, file.layout.rows), file.layout.view))
+    write_columns(path, *kinds[0])
+
+    def write(number: int) -> None:
+        while not stop.is_set():
+            write_columns(path, *kinds[number], block_rows=16)
+
+    def read(_: int) -> bytes:
+        shard, part = read_shard(path), read_rows(path, 10, 40)
+        known = [columns["features"] for columns, _ in kinds]
+        assert any(np.array_equal(shard.features, features) for features in known)
+        assert any(np.array_equal(part.features, features[10:40]) for features in known)
+        return shard.features.tobytes()
+
+    with ThreadPoolExecutor(4) as pool:
+        writers = [pool.submit(write, number) for number in (0, 1)]
+        try:
+            seen = set(pool.map(read, range(200)))
+        finally:
+            stop.set()
+        for writer in writers:
+            writer.result()
+    assert len(seen) == 2, "both were there at some time"
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["1", "2", "view"]

@@ -111,6 +111,53 @@ def test_views_without_fragments_and_opaque_scenes_are_skipped_and_counted() -> 
     assert [task.name for task in runner.of("label")] == ["knots view1", "town view0", "town view1"]
 
 
+@pytest.mark.parametrize("how", ["opaque", "empty"])
+def test_a_held_out_scene_with_nothing_transparent_is_not_scored_and_that_is_said(how: str) -> None:
+    runner = TableRunner()
+    runner.opaque = {"town"} if how == "opaque" else set()
+    runner.empty = {"town view0", "town view1"} if how == "empty" else set()
+    said: list[str] = []
+    runner.progress.note = said.append  # type: ignore[method-assign]
+    result = run(runner, spec())
+    assert {task.name.split()[0] for task in runner.of("label")} == {"bottles", "knots"}, "no curve work for it"
+    assert result["score"] is None
+    assert result["per_scene"] == {}
+    assert runner.published[0]["score"] is None
+    (note,) = said
+    assert "town" in note
+    assert "no scene remains that was held out: nothing is scored" in note
+    skipped = {"opaque": "opaque scenes", "empty": "views without a transparent pixel"}[how]
+    assert runner.progress.skips[skipped] == {"opaque": 1, "empty": 2}[how]
+
+
+def test_one_held_out_scene_of_two_without_a_transparent_view_leaves_the_other_scored() -> None:
+    runner = TableRunner()
+    runner.empty = {"town view0", "town view1"}
+    said: list[str] = []
+    runner.progress.note = said.append  # type: ignore[method-assign]
+    uses = [{"scene": key, "holdout": record.name != "bottles"} for key, record in SCENES.items()]
+    result = run(runner, spec(scenes=uses))
+    assert result["score"] == pytest.approx(0.5)
+    assert set(result["per_scene"]) == {"knots"}
+    assert len(said) == 1
+    assert "nothing is scored" not in said[0]
+
+
+def test_what_took_no_part_in_the_labels_is_counted_over_all_views() -> None:
+    runner = TableRunner()
+    run(runner, spec())
+    assert runner.progress.skips["pixels already exact at k_min"] == 3 * 6
+    assert "budgets given more than once" not in runner.progress.skips, "what did not occur is not mentioned"
+
+
+@pytest.mark.parametrize("opaque", [{"bottles", "knots"}, {"bottles", "knots", "town"}])
+def test_only_opaque_scenes_to_train_on_are_a_problem(opaque: set[str]) -> None:
+    runner = TableRunner()
+    runner.opaque = opaque
+    with pytest.raises(Problem, match=r"Nothing in bottles, knots.* is transparent"):
+        run(runner, spec())
+
+
 def test_nothing_transparent_to_train_on_is_a_problem() -> None:
     runner = TableRunner()
     runner.empty = {f"{name} view{i}" for name in ("bottles", "knots") for i in range(2)}

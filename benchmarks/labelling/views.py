@@ -1,0 +1,87 @@
+"""Captured views that the labeller is measured on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from benchmarks.casting.cases import Case
+from renderer.capture import capture
+from renderer.context import gl_context
+from renderer.frame import Frame
+from renderer.gpu_scene import GpuScene
+from renderer.scene import LoadOptions, load_scene
+from renderer.views import listed_views, placed_views, sampled_views
+from schemas.fragments import FragmentDump
+from schemas.problem import Problem
+from schemas.scene import SceneArrays
+from schemas.view import View
+
+SIZE = (1430, 960)
+MODES: dict[str, float | None] = {"alpha .33": 0.33, "authored": None}
+"""Opacity of every surface: one for all, so that opaque scenes count as well; and each its own."""
+_SAMPLED = 2
+"""Views of a stage for which none are listed."""
+_SEED = 11
+
+
+@dataclass(frozen=True, slots=True)
+class CapturedView:
+    """A view of a stage.
+
+    Attributes:
+        scene: The scene's name.
+        stage: The stage's file, relative to the scene's folder.
+        mode: Name from MODES.
+        view: The camera's name.
+        dump: Its fragments; None where the capture is of no use, and `why` says so.
+        why: Why there are none.
+    """
+
+    scene: str
+    stage: str
+    mode: str
+    view: str
+    dump: FragmentDump | None
+    why: str = ""
+
+    @property
+    def key(self) -> tuple[str, str, str, str]:
+        """What tells it from other views."""
+        return self.scene, self.stage, self.mode, self.view
+
+
+def captured_views(
+    case: Case, size: tuple[int, int], most: int | None, known: frozenset[tuple[str, str, str, str]] = frozenset()
+) -> Iterator[CapturedView]:
+    """The views of a stage in both modes, one at a time; a view is gone when the next one is asked for.
+
+    Args:
+        case: The stage.
+        size: Pixels per row, rows.
+        most: Most views of the stage, spread over those that are listed; None: all of them.
+        known: Keys of the views to leave out.
+    """
+    stage = str(case.path).rpartition(f"/{case.scene}/")[2]
+    for mode, alpha in MODES.items():
+        try:
+            scene = load_scene(case.path, LoadOptions(alpha=alpha, variants=case.variants))
+        except Problem as problem:
+            yield CapturedView(case.scene, stage, mode, "", None, problem.title)
+            return
+        if scene.is_opaque:
+            yield CapturedView(case.scene, stage, mode, "", None, "nothing in it is transparent")
+            continue
+        gpu = GpuScene(gl_context(), scene)
+        for view in _cameras(case, scene, most):
+            if (case.scene, stage, mode, view.name) not in known:
+                dump = capture(Frame(gpu, view, *size)).dump
+                yield CapturedView(case.scene, stage, mode, view.name, dump)
+
+
+def _cameras(case: Case, scene: SceneArrays, most: int | None) -> tuple[View, ...]:
+    listed = listed_views(case.views, case.path) if case.views is not None else ()
+    if not listed:
+        return sampled_views(scene, _SAMPLED if most is None else min(most, _SAMPLED), _SEED)
+    placed = placed_views(listed, scene)
+    return placed if most is None else placed[:: max(1, len(placed) // most)][:most]

@@ -1,0 +1,163 @@
+"""Fills of a budget against sorted float64 thresholds, and sums of 1e7 importances in every order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from labeller.curves import Curves
+from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
+from schemas.tail import DENSITY_G
+from services.stress.allocations import edge_budgets
+from services.stress.bounds import counted, within
+from services.stress.findings import Finding, Options, worst_of
+from services.stress.threads import one_thread
+
+Counts = NDArray[np.int32]
+Numbers = NDArray[np.float32]
+
+
+def run(options: Options) -> Iterator[Finding]:
+    """Both fills at every edge budget, then the sums."""
+    rng = np.random.default_rng(options.seed)
+    pixels = 300 if options.quick else 2000
+    n = np.where(rng.random(pixels) < 0.02, 4096, rng.integers(0, 7, pixels)).astype(np.int32)
+    limits = []
+    for name, weights in weight_cases(rng, pixels).items():
+        found = [(f, budget_fill(weights, n, f, feasible_k_min(n, f))) for f in edge_budgets(n)]
+        limits.append(_limits(f"weights {name}", n, found))
+        yield _order_of_weights(name, n, weights, found)
+    for name, (a, b) in gain_cases(rng, pixels).items():
+        found = [(f, solve_lambda(a, b, n, f, feasible_k_min(n, f))[0]) for f in edge_budgets(n)]
+        limits.append(_limits(f"gains {name}", n, found))
+        yield _order_of_gains(name, n, a, b, found)
+    yield worst_of(limits, f"{len(limits)} inputs, every F")
+    yield from _sums(rng, 100_000 if options.quick else 10_000_000)
+
+
+def weight_cases(rng: np.random.Generator, pixels: int) -> dict[str, Numbers]:
+    """Importances of all kinds, float32 [P]."""
+    return {
+        name: values.astype(np.float32)
+        for name, values in {
+            "random": rng.random(pixels),
+            "all 0": np.zeros(pixels),
+            "all equal": np.full(pixels, 1 / 3),
+            "1e-45 to 3e38": 10.0 ** rng.uniform(-44.8, 38.0, pixels),
+            "one of 1, others of 1e-7": np.where(np.arange(pixels) == pixels // 2, 1.0, 1e-7),
+            "0 and 1": rng.integers(0, 2, pixels),
+            "1 ulp apart": 1.0 + rng.integers(0, 3, pixels) * 2.0**-23,
+        }.items()
+    }
+
+
+def gain_cases(rng: np.random.Generator, pixels: int) -> dict[str, tuple[Numbers, Numbers]]:
+    """Gain curves a and b of all kinds, float32 [P] each."""
+    cases = {
+        "random": (rng.normal(-8.0, 3.0, pixels), rng.uniform(0.02, 2.0, pixels)),
+        "all equal": (np.full(pixels, -8.0), np.full(pixels, 0.5)),
+        "least b": (rng.normal(-8.0, 3.0, pixels), np.full(pixels, 0.02)),
+        "huge a": (rng.choice([-1e30, 1e30], pixels), rng.uniform(0.02, 2.0, pixels)),
+        "huge b": (rng.normal(-8.0, 3.0, pixels), rng.choice([0.02, 1e30], pixels)),
+        "1 ulp apart": (-8.0 + rng.integers(0, 3, pixels) * 2.0**-20, np.full(pixels, 0.25)),
+    }
+    return {name: (a.astype(np.float32), b.astype(np.float32)) for name, (a, b) in cases.items()}
+
+
+def _limits(name: str, n: Counts, found: list[tuple[int, Counts]]) -> Finding:
+    wrong, where = 0, ""
+    for budget, k in found:
+        least = np.minimum(n, feasible_k_min(n, budget))
+        count = abs(int(k.sum()) - min(budget, int(n.sum()))) + int(((k < least) | (k > n)).sum())
+        if count:
+            wrong, where = wrong + count, f"F {budget}"
+    return counted("fill.limits", name, wrong, where)
+
+
+def _order_of_weights(name: str, n: Counts, weights: Numbers, found: list[tuple[int, Counts]]) -> Finding:
+    """A pixel's j-th fragment comes at the scale `j / weight`: what was given must come before what was not."""
+    w = weights.astype(np.float64)
+    late, places = [], []
+    for budget, k in found:
+        least = np.minimum(n, feasible_k_min(n, budget))
+        with np.errstate(divide="ignore"):
+            given, missing = (k > least) & (w > 0.0), (k < n) & (w > 0.0)
+            last = (k[given] / w[given]).max(initial=0.0)
+            first = ((k[missing] + 1) / w[missing]).min(initial=math.inf)
+        late.append(max(last / first - 1.0, 0.0) if math.isfinite(first) else 0.0)
+        places.append(f"F {budget}")
+    return within("fill.budget", name, np.array(late), np.zeros(len(late)), places)
+
+
+def _order_of_gains(name: str, n: Counts, a: Numbers, b: Numbers, found: list[tuple[int, Counts]]) -> Finding:
+    """A pixel's j-th fragment comes at the price `a - (j - 1.5) b`: what was given must not be below what was not."""
+    gain, decay = a.astype(np.float64), b.astype(np.float64)
+    late, places = [], []
+    for budget, k in found:
+        least = np.minimum(n, feasible_k_min(n, budget))
+        given, missing = k > least, k < n
+        lowest = (gain - (k - 1.5) * decay)[given].min(initial=math.inf)
+        highest = (gain - (k - 0.5) * decay)[missing].max(initial=-math.inf)
+        scale = float((np.abs(gain) + n * decay).max())
+        late.append(max((highest - lowest) / scale, 0.0))
+        places.append(f"F {budget}")
+    return within("fill.lambda", name, np.array(late), np.zeros(len(late)), places)
+
+
+def _sums(rng: np.random.Generator, count: int) -> Iterator[Finding]:
+    """Sums in several orders, in float64 and in one float32 accumulator, against the exactly rounded sum."""
+    for name, values in (
+        ("uniform", rng.random(count)),
+        ("one of 1e7, others of 1e-1", np.where(np.arange(count) == 0, 1e7, 0.1)),
+        ("VKB-like", np.maximum(0.0, 0.3 + 0.1 * (rng.random(count) - 0.5))),
+        ("1e-30 to 1", 10.0 ** rng.uniform(-30.0, 0.0, count)),
+    ):
+        numbers = values.astype(np.float32)
+        truth = math.fsum(numbers.tolist())
+        orders = {
+            "forward": numbers,
+            "reversed": numbers[::-1],
+            "shuffled": rng.permutation(numbers),
+            "ascending": np.sort(numbers),
+        }
+        used = {order: _total(x) for order, x in orders.items()}
+        used["16 chunks"] = sum(_total(x) for x in np.array_split(numbers, 16))
+        naive = {order: float(_float32_sum(np.ascontiguousarray(x))) for order, x in orders.items()}
+        naive["16 chunks"] = float(sum((_float32_sum(x) for x in np.array_split(numbers, 16)), np.float32(0.0)))
+        for path, sums in (("sum", used), ("sum.rejected", naive)):
+            case = f"{count:.0e} importances, {name}"
+            yield within(path, case, np.array(list(sums.values())), np.full(len(sums), truth), list(sums))
+    yield from _fill_in_any_order(rng, count)
+
+
+def _total(errors: Numbers) -> float:
+    """What a view's errors add up to, by the code that does it: each number is a pixel's error at k = 0."""
+    return Curves(np.arange(len(errors) + 1), errors, "density", DENSITY_G, "display").total(np.zeros(len(errors), int))
+
+
+@njit(cache=True)
+def _float32_sum(values: Numbers) -> np.float32:
+    total = np.float32(0.0)
+    for value in values:
+        total += value
+    return total
+
+
+def _fill_in_any_order(rng: np.random.Generator, count: int) -> Iterator[Finding]:
+    n = rng.integers(0, 9, count).astype(np.int32)
+    budget = int(0.4 * n.sum())
+    # Different weights, so that no tie is decided by the index.
+    weights = rng.permutation(np.linspace(0.1, 1.0, count))
+    plain = budget_fill(weights, n, budget, 1)
+    for name, order in (("reversed", np.arange(count)[::-1]), ("shuffled", rng.permutation(count))):
+        moved = np.empty_like(plain)
+        moved[order] = budget_fill(weights[order], n[order], budget, 1)
+        wrong = np.flatnonzero(moved != plain)
+        yield counted("fill.order", f"{count:.0e} importances, {name}", len(wrong), f"pixel {wrong[:1]}")
+    with one_thread():
+        alone = budget_fill(weights, n, budget, 1)
+    yield counted("fill.order", f"{count:.0e} importances, 1 thread", int((alone != plain).sum()))

@@ -1,0 +1,154 @@
+"""Every technique's picture against its float64 twin, and what the bounded ones do with their budget."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.allocation.fill import budget_fill, feasible_k_min
+from renderer.frame import Frame
+from renderer.techniques import (
+    TECHNIQUES,
+    Budget,
+    KBuffer,
+    KBufferDynamic,
+    KBufferOptimal,
+    Moment,
+    Needs,
+    Rendered,
+    technique,
+)
+from renderer.techniques.base import ChainForm
+from renderer.techniques.chain import one_pass_available
+from schemas.tail import TAILS
+from services.stress.findings import Finding, Options, compared
+from services.stress.gl_bounds import bound_of
+from services.stress.gl_cases import Case
+from services.stress.gl_moment import DELICATE
+from services.stress.gl_stacks import ILL_CONDITIONED
+from services.stress.gl_twins import Truth, Unbounded, unbounded
+
+BOUNDED = tuple(name for name, entry in TECHNIQUES.items() if entry.family == "bounded")
+_WHOLE = tuple(name for name in BOUNDED if name not in (KBuffer.name, KBufferDynamic.name))
+"""Those that give every fragment of their budget away."""
+
+BUDGETS: Mapping[str, Callable[[int, int], int]] = {
+    "0": lambda total, occupied: 0,
+    "occupied - 1": lambda total, occupied: occupied - 1,
+    "occupied": lambda total, occupied: occupied,
+    "N/64": lambda total, occupied: total // 64,
+    "N/7": lambda total, occupied: total // 7,
+    "N/3": lambda total, occupied: total // 3,
+    "N - 1": lambda total, occupied: total - 1,
+    "N": lambda total, occupied: total,
+    "2 N": lambda total, occupied: 2 * total,
+}
+"""F of N fragments and so many occupied pixels, by name."""
+
+
+def random_allocation(frame: Frame, budget: Budget) -> NDArray[np.int32]:
+    """An allocation that no rule would make: every k that a budget allows occurs somewhere."""
+    n = frame.count()
+    weights = np.random.default_rng(budget.fragments).random(frame.pixels) ** 4
+    return budget_fill(weights, n, budget.fragments, feasible_k_min(n, budget.fragments))
+
+
+def steps(
+    case: Case, options: Options, driver: str, bundle: Path
+) -> Iterator[tuple[str, Callable[[], Iterator[Finding]]]]:
+    """All techniques on a case, each with its name, rendered when called.
+
+    Args:
+        case: What is rendered.
+        options: Quick runs leave out some parameters.
+        driver: For the paths.
+        bundle: What `kbuffer-deep` predicts with.
+    """
+    truth = Truth.of(case)
+    for each in unbounded(options):
+        if not (case.scenery.deep and each.peeled):
+            yield each.name, partial(picture_rows, case, truth, each, driver)
+    needs = Needs(bundle=bundle, allocate=random_allocation)
+    for name in BOUNDED:
+        yield name, partial(bounded_rows, case, truth, name, needs, driver)
+    if one_pass_available(case.frame.ctx):  # the others have taken it
+        name = KBufferOptimal.name
+        yield f"{name}.two-pass", partial(bounded_rows, case, truth, name, needs, driver, "two-pass")
+
+
+def picture_rows(case: Case, truth: Truth, each: Unbounded, driver: str) -> Iterator[Finding]:
+    """A technique without a budget; `moment` has a row of its own for what is ill conditioned."""
+    linear = each.technique.render(case.frame, Budget(0)).linear.reshape(-1, 3)
+    path = f"{each.name} · {driver}"
+    expected = each.twin(truth)
+    if each.bound != Moment.name:
+        yield _compared(case, path, case.pixels, linear, expected, each.bound)
+        return
+    ill = np.array([case.stack(int(p)) in ILL_CONDITIONED for p in case.pixels])
+    ill |= np.isin(case.dump.counts[case.pixels], DELICATE)
+    yield _compared(case, path, case.pixels[~ill], linear, expected, "moment")
+    yield _compared(
+        case, f"{each.name}.ill conditioned · {driver}", case.pixels[ill], linear, expected, "moment.ill conditioned"
+    )
+
+
+def bounded_rows(
+    case: Case, truth: Truth, name: str, needs: Needs, driver: str, chain: ChainForm = "auto"
+) -> Iterator[Finding]:
+    """A technique with a budget: every tail, then whether budgets and k were kept."""
+    made = technique(name, needs)
+    path = name if chain == "auto" else f"{name}.{chain}"
+    wrong: list[str] = []
+    occupied = int(np.count_nonzero(case.dump.counts))
+    for tail in TAILS:
+        for label in case.scenery.budgets:
+            fragments = BUDGETS[label](case.dump.total, occupied)
+            rendered = made.render(case.frame, Budget(fragments, tail, chain=chain))
+            wrong += [f"F = {label}, {tail}: {why}" for why in broken_limits(name, rendered, case, fragments)]
+            linear, expected = rendered.linear.reshape(-1, 3), truth.hybrid(rendered.k, tail)
+            row = _compared(case, f"{path}.{tail} · {driver}", case.pixels, linear, expected, "bounded")
+            yield replace(row, where=f"F = {label}, {row.where}")
+    count = float(len(wrong))
+    bound = bound_of("bounded.limits", deep=False)
+    where = f"{case.scenery.name}: {wrong[0]}" if wrong else "nowhere"
+    yield Finding(f"{path}.F, K and k_min · {driver}", case.name, count, count, where, bound.value, bound.measure)
+
+
+def broken_limits(name: str, rendered: Rendered, case: Case, fragments: int) -> list[str]:
+    """What a picture within a budget does that it must not (METHOD.md section 3), in words."""
+    n, k = case.dump.counts, rendered.k.astype(np.int64)
+    whole = name in _WHOLE
+    # `kbuffer` reserves slots where nothing is, so that its budget may not reach every occupied pixel.
+    k_min = feasible_k_min(n, fragments) if name != KBuffer.name else 0
+    spent = min(fragments, case.dump.total)
+    checks = {
+        "the picture is not finite": not np.isfinite(rendered.linear).all(),
+        f"sum K = {k.sum()} is above F": k.sum() > fragments,
+        f"sum K = {k.sum()} leaves a part of F": whole and k.sum() != spent,
+        "K is above n": bool((k > n).any()),
+        "K is below k_min": bool((k < np.minimum(n, k_min)).any()),
+        "slots are not what was captured": rendered.captured != k.sum(),
+    }
+    return [why for why, broken in checks.items() if broken]
+
+
+def _compared(
+    case: Case,
+    path: str,
+    pixels: NDArray[np.int64],
+    found: NDArray[np.floating],
+    truth: NDArray[np.float64],
+    key: str,
+) -> Finding:
+    """Some pixels of a picture and its twin, [P, 3] each."""
+    bound = bound_of(key, case.scenery.deep)
+
+    def where(index: tuple[int, ...]) -> str:
+        return case.place(int(pixels[index[0]]))
+
+    return compared(path, case.name, found[pixels], truth[pixels], bound.value, bound.measure, bound.floor, where)

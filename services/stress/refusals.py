@@ -1,0 +1,93 @@
+"""NaN and infinity: every entry point that takes arrays of numbers must refuse them, and say what is wrong."""
+
+from __future__ import annotations
+
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import labeller
+from labeller.curves import composite, error_curves
+from renderer.allocation.fill import budget_fill, paper_fill, solve_lambda
+from renderer.features import gather
+from schemas.problem import Problem
+from services.stress.bounds import counted
+from services.stress.cases import dump_of, some_list
+from services.stress.findings import Finding, NotRun, Options, Row, worst_of
+from services.stress.predictors import form, networks, real_features
+
+PATH: Final = "refused.arrays"
+_WORDS: Final = ("finite", "positive", "NaN", "numbers")
+
+
+def run(options: Options) -> Iterator[Row]:
+    """Each bad number to each entry point."""
+    rng = np.random.default_rng(options.seed)
+    dump = dump_of([some_list(rng, n) for n in (1, 5, 0, 3, 4)])
+    n, some = dump.counts, np.ones(dump.pixels, np.float32)
+    rows: dict[str, list[Finding]] = {}
+    for name, number in (("NaN", np.nan), ("infinity", np.inf), ("-infinity", -np.inf)):
+        depth = dump.depth.copy()
+        depth[0] = number  # of a list of its own, so that the order within it is not what is wrong
+        bad, wrong = replace(dump, depth=depth), some.copy()
+        wrong[3] = number
+        arrays: dict[str, ArrayLike] = {"offsets": dump.offsets, "rgba": dump.rgba, "depth": depth}
+        calls: dict[str, Callable[[], object]] = {
+            "depth, error_curves": partial(error_curves, bad),
+            "depth, composite": partial(composite, bad, n),
+            "depth, gather": partial(gather, bad),
+            "depth, labeller.allocate": partial(labeller.allocate, arrays, [10]),
+            "g, error_curves": partial(error_curves, dump, g=number),
+            "g, composite": partial(composite, dump, n, g=number),
+            "weight, error_curves": partial(error_curves, dump, weights=wrong),
+            "weight, budget_fill": partial(budget_fill, wrong, n, 12, 0),
+            "weight, paper_fill": partial(paper_fill, wrong, 12),
+            "a, solve_lambda": partial(solve_lambda, wrong, some, n, 12, 0),
+            "b, solve_lambda": partial(solve_lambda, some, wrong, n, 12, 0),
+        }
+        for case, call in calls.items():
+            rows.setdefault(case, []).append(_refusal(name, call))
+    for case, tried in rows.items():
+        yield worst_of(tried, f"NaN, infinity, -infinity as {case}")
+    yield from _networks(options)
+
+
+def _networks(options: Options) -> Iterator[Row]:
+    """Networks answer NaN with NaN, which the fill then refuses; one with a weight that is NaN is not exported."""
+    from trainer.export_glsl import glsl_source
+
+    real = real_features(np.random.default_rng(options.seed), 64)
+    weights = next(iter(networks(options.seed, real).values()))
+    damaged = real.copy()
+    damaged[7, 3] = np.nan
+    n = np.full(len(real), 5)
+    with tempfile.TemporaryDirectory() as folder:
+        for path in ("predict.numpy", "predict.torch", "predict.onnx"):
+            predict = form(path, weights, Path(folder))
+            if isinstance(predict, NotRun):
+                continue  # said by the suite of the networks
+            gain = predict(damaged).astype(np.float64)
+            yield _refusal(f"NaN as feature, {path}", partial(solve_lambda, gain[:, 0], gain[:, 1], n, 100, 1))
+    weights.layers[0][0][0, 0] = np.nan
+    yield _refusal("NaN as weight of a network, GLSL", partial(glsl_source, weights))
+
+
+def _refusal(case: str, call: Callable[[], object]) -> Finding:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            call()
+    except (Problem, ValueError) as error:
+        said = str(error)
+        clear = any(word in said for word in _WORDS)
+        return counted(PATH, case, int(not clear), "" if clear else f"unclear: {said}")
+    except Exception as error:
+        return counted(PATH, case, 1, f"{type(error).__name__}: {error}")
+    return counted(PATH, case, 1, "accepted")

@@ -1,0 +1,112 @@
+"""The CPU part of `diaphane stress`, quick: every fast path is within its bound."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+import pytest
+
+from labeller.curves import error_curves
+from renderer.features import FEATURES, derive, gather
+from services.stress.bounds import BOUNDS
+from services.stress.cases import curve_cases, dump_of, some_list
+from services.stress.findings import Finding, Options, Row
+from services.stress.suites import Listed, rows_of
+from services.stress.twins import features64, network64, sums64
+
+QUICK = Options(quick=True)
+
+
+@cache
+def rows(name: str) -> list[Row]:
+    return list(rows_of(Listed(name, ()), QUICK))
+
+
+def findings(name: str) -> list[Finding]:
+    return [row for row in rows(name) if isinstance(row, Finding)]
+
+
+def refused(found: Sequence[Row]) -> list[Row]:
+    return [row for row in found if not (isinstance(row, Finding) and row.ok)]
+
+
+@pytest.mark.parametrize(
+    ("name", "paths"),
+    [
+        (
+            "curves",
+            {"curves", "curves.weights", "curves.by_g", "composite", "reference", "transmittance", "csr"}
+            | {"transmittance.rejected"},
+        ),
+        ("fills", {"fill.limits", "fill.budget", "fill.lambda", "fill.order", "sum", "sum.rejected"}),
+        ("features", {"features.gather", "features.derive", "features.spread"}),
+    ],
+)
+def test_every_path_of_a_suite_is_within_its_bound(name: str, paths: set[str]) -> None:
+    found = rows(name)
+    assert refused(found) == []
+    assert {row.path for row in found} == paths
+    assert all(row.bound == BOUNDS[row.path].value for row in found if isinstance(row, Finding))
+
+
+def test_the_cases_are_what_method_section_6_names() -> None:
+    cases = {case.name: case.dump for case in curve_cases(False, 0)}
+    alphas = {int(a) for dump in cases.values() for a in np.unique(dump.rgba[:, 3])}
+    assert {0, 1, 128, 254, 255} <= alphas
+    counts = np.concatenate([dump.counts for dump in cases.values()])
+    assert set(range(41)) | {4096} <= set(counts.tolist())
+    depth = np.concatenate([dump.depth for dump in cases.values()])
+    assert depth.min() < 1.2e-38
+    assert depth.max() > 1e38
+    assert len(np.unique(cases["depth ties across an image"].depth)) == 1
+    far = cases["near/far 1e7, n 32"].depth
+    assert far.max() / far.min() > 1e6
+    for dump in cases.values():
+        keys = np.lexsort((dump.rgba.view("<u4")[:, 0], dump.depth, np.repeat(np.arange(dump.pixels), dump.counts)))
+        assert (keys == np.arange(dump.total)).all(), "front to back, ties by colour"
+
+
+def test_the_rejected_formula_is_as_bad_as_told_and_the_one_in_use_is_not() -> None:
+    found = {(row.path, row.case): row for row in findings("curves")}
+    good = found["transmittance", "alpha 1/255, n 4096"]
+    bad = found["transmittance.rejected", "alpha 1/255, n 4096, float32"]
+    assert good.relative < 1e-5
+    assert bad.relative > 1.0
+    assert not bad.judged
+    assert good.judged
+
+
+def test_one_float32_accumulator_loses_what_the_sum_in_use_keeps() -> None:
+    sums = findings("fills")
+    assert max(row.relative for row in sums if row.path == "sum") < 1e-12
+    assert max(row.relative for row in sums if row.path == "sum.rejected") > 1e-4
+
+
+def test_the_twins_are_what_the_definitions_say() -> None:
+    rgba = np.array([[255, 0, 0, 51], [255, 0, 0, 102]], np.uint8)
+    dump = dump_of([(rgba, np.array([2.0, 4.0], np.float32))], (0, 0, 255))
+    found = dict(zip(FEATURES, features64(sums64(dump))[0], strict=True))
+    assert found["log_n"] == 1.0
+    assert found["alpha_mean"] == pytest.approx(0.3)
+    assert found["alpha_std"] == pytest.approx(0.1)
+    assert found["optical_depth"] == pytest.approx(np.log1p(-np.log(0.8 * 0.6)))
+    assert found["depth_extent"] == pytest.approx(np.log(1e-4 + 0.5))
+    assert (found["rgb_mean_r"], found["rgb_std_r"], found["background_b"]) == (1.0, 0.0, 1.0)
+    layers = [(np.array([[2.0], [0.0]], np.float32), np.array([1.0, 0.0], np.float32))]
+    a, b = network64(np.zeros(1, np.float32), np.ones(1, np.float32), layers, np.array([[3.0]], np.float32))[0]
+    assert (a, b) == pytest.approx((7.0, np.log(2.0) + 0.02))
+
+
+def test_the_worst_spread_known_is_committed_and_within_its_bound() -> None:
+    found = {row.path: row for row in findings("features")}["features.spread"]
+    assert found.where.startswith("found: 89 equal fragments")
+    assert found.absolute > 4e-4
+
+
+@pytest.mark.parametrize("n", [1, 4096])
+def test_features_of_long_lists_stay_finite(n: int) -> None:
+    dump = dump_of([some_list(np.random.default_rng(n), n, 1)])
+    assert np.isfinite(derive(gather(dump))).all()
+    assert np.isfinite(error_curves(dump).error).all()

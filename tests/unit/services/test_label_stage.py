@@ -1,0 +1,75 @@
+"""Stage `label`: what it answers for every budget, and what it does not compute."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from safetensors.numpy import load_file
+from support.dumps import random_dump
+
+from labeller.allocation import RULES
+from labeller.curves import error_curves
+from labeller.rules import allocate_curves
+from labeller.shards import read_shard
+from renderer.dump import write_dump
+from services.stages import label
+from services.stages.desk import SHARD, load_facts
+from services.tasks import Facts, Task
+
+DUMP = random_dump(20, 15, 9, seed=5)
+N = DUMP.total
+BUDGETS = [N // 2, 2 * N, N // 4, N // 2, N]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    rendered, made = tmp_path_factory.mktemp("render"), tmp_path_factory.mktemp("label")
+    write_dump(rendered, DUMP)
+    params = {"budgets": BUDGETS, "tail": "density", "g": 0.75, "metric": "display", "seed": 3}
+    task = Task(name="box front", stage="label", version="0", params=params)
+    desk = SimpleNamespace(artifact=lambda task, stage: rendered)
+    label.make(desk, task, made, lambda fraction, note: None)  # type: ignore[arg-type]
+    return made
+
+
+@pytest.fixture(scope="module")
+def facts(folder: Path) -> Facts:
+    return load_facts(folder)
+
+
+def test_every_budget_has_an_answer_in_the_order_asked(facts: Facts) -> None:
+    curves = error_curves(DUMP)
+    assert set(facts["errors"]) == set(RULES)
+    for rule in RULES:
+        expected = [found.error for found in allocate_curves(DUMP, curves, BUDGETS, rule)]
+        assert facts["errors"][rule] == pytest.approx(expected)
+    for budget, certificate in zip(BUDGETS, facts["certificates"], strict=True):
+        assert 0.0 <= certificate["bound"] <= certificate["error"]
+        assert (certificate["error"] == 0.0) == (budget >= N)
+
+
+def test_a_budget_is_allocated_once_and_one_that_holds_everything_never(folder: Path) -> None:
+    kept = load_file(folder / "optimal.safetensors")
+    assert set(kept) == {str(N // 2), str(N // 4)}
+    assert label.optimal(folder, N // 2).sum() <= N // 2
+
+
+def test_what_took_no_part_is_counted(facts: Facts, folder: Path) -> None:
+    exact = facts["skips"].pop("pixels already exact at k_min")
+    assert facts["skips"] == {
+        "pixels that k_min covers": int(np.count_nonzero(DUMP.counts == 1)),
+        "budgets that hold all fragments of a view": 2,
+        "budgets given more than once": 1,
+    }
+    vertices = np.diff(read_shard(folder / SHARD).hull_offsets)
+    assert np.count_nonzero(vertices == 0) == pytest.approx(0.2 * exact, abs=6), "the rows are a fifth of the pixels"
+
+
+def test_the_shard_is_the_one_that_the_facts_name(facts: Facts, folder: Path) -> None:
+    shard = folder / SHARD
+    assert facts["shard"]["bytes"] == shard.stat().st_size
+    assert read_shard(shard).meta.sampling.seed == 3
+    assert [level.budget for level in read_shard(shard).meta.levels if level.scored] == [N // 4, N // 2]
