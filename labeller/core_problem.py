@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 _STATES: Final = 1 << 22  # of all pixels together, 4 bytes each
 _WORK: Final = 1 << 27  # steps of the dynamic programming
 _SLACK: Final = 1e-12  # of sums that were added up in another order
-_ROUNDING: Final = 1e-14  # of a loss, relative to the least cost of its pixel
+_ROUNDING: Final = 1e-15  # of a loss, relative to the price of the fragments that it is about
 
 
 class Core(NamedTuple):
@@ -120,17 +120,19 @@ def _affordable(first: NDArray[np.int64], last: NDArray[np.int64], reach: int) -
 
 @njit(cache=True, error_model="numpy")
 def _losses(core: Core, lam: float) -> NDArray[np.float64]:
+    # By differences from the cheapest k: next to the whole cost of a long list, small losses would be lost.
     loss = np.empty(len(core.error))
     for c in range(len(core.base)):
-        smallest = np.inf
-        for i in range(core.offsets[c], core.offsets[c + 1]):
-            k = i - core.offsets[c]
-            loss[i] = np.float64(core.error[i]) + lam * k if k >= core.least[c] else np.inf
-            smallest = min(smallest, loss[i])
-        for i in range(core.offsets[c], core.offsets[c + 1]):
-            loss[i] -= smallest
-            if loss[i] <= _ROUNDING * smallest:
-                loss[i] = 0.0
+        begin, end = core.offsets[c], core.offsets[c + 1]
+        cheapest = begin + core.least[c]
+        loss[begin:cheapest] = np.inf
+        for i in range(cheapest + 1, end):
+            if np.float64(core.error[i]) - np.float64(core.error[cheapest]) + lam * (i - cheapest) < 0.0:
+                cheapest = i
+        for i in range(begin + core.least[c], end):
+            price = lam * (i - cheapest)
+            lost = np.float64(core.error[i]) - np.float64(core.error[cheapest]) + price
+            loss[i] = lost if lost > _ROUNDING * abs(price) else 0.0
     return loss
 
 

@@ -77,7 +77,8 @@ def error_curves(
     Raises:
         Problem: If the dump is malformed or has a depth that is not finite, or if weights are not such numbers.
     """
-    return _error_curves(dump, tail, (g if tail == "density" else 0.0,), g, metric, weights)[0]
+    (steepness,) = _checked_g((g,))
+    return _error_curves(dump, tail, (steepness if tail == "density" else 0.0,), steepness, metric, weights)[0]
 
 
 def error_curves_by_g(
@@ -123,8 +124,11 @@ def _error_curves(
 
 
 def _checked_g(gs: Sequence[float]) -> NDArray[np.float64]:
-    steep = np.array(gs, dtype=np.float64)
-    if not (np.isfinite(steep).all() and (steep >= 0.0).all()):
+    try:
+        steep = np.array(gs, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        steep = np.full(1, np.nan)
+    if not (steep.ndim == 1 and np.isfinite(steep).all() and (steep >= 0.0).all()):
         raise Problem(f"The density tail's g is {gs}.", "Give finite numbers that are not negative.", ExitCode.USAGE)
     return steep
 
@@ -183,18 +187,24 @@ def composite(
 def check_dump(dump: FragmentDump) -> None:
     """Refuse a dump whose parts do not fit together, or with a depth that is not a positive number.
 
+    What is compiled goes by shapes and types without a look: those of any other would be read beyond their ends.
+
     Raises:
         Problem: What is wrong.
     """
     fits = (
         dump.offsets.shape == (dump.pixels + 1,)
         and dump.offsets[0] == 0
-        and dump.offsets[-1] == dump.total == len(dump.rgba)
+        and dump.offsets[-1] == dump.total
         and bool((dump.counts >= 0).all())
-        and dump.background.shape == (dump.pixels, 3)
+        and (dump.depth.shape, dump.rgba.shape) == ((dump.total,), (dump.total, 4))
+        and (dump.background.shape, dump.facing.shape) == ((dump.pixels, 3), (dump.pixels,))
+        and dump.offsets.dtype == np.int64
+        and dump.depth.dtype == np.float32
+        and all(array.dtype == np.uint8 for array in (dump.rgba, dump.background, dump.facing))
     )
     if not fits:
-        raise Problem("The fragment dump is malformed: its lists do not fit its size.", "Render the view again.")
+        raise Problem("The fragment dump is malformed: lists, size and types do not fit.", "Render the view again.")
     if not (np.isfinite(dump.depth).all() and dump.depth.min(initial=1.0) > 0.0):
         raise Problem(
             "The fragment dump has depths that are not positive numbers.",

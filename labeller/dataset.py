@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from labeller.dataset_index import INDEX, DatasetIndex, ShardEntry, Split, read_index
+from labeller.dataset_index import INDEX, DatasetIndex, Labels, ShardEntry, Split, read_index
 from labeller.shards import Shard, damaged, explained, read_rows, read_shard
 from schemas.problem import ExitCode, Problem
 
@@ -79,7 +79,10 @@ class Dataset:
         shard = self.read(entry)
         with explained(path), path.open("rb") as stream:
             sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
-        if (sha256, len(shard.n), shard.segments) != (entry.sha256, entry.rows, entry.segments):
+        meta = shard.meta
+        found = sha256, len(shard.n), shard.segments, meta.fragments, Labels.of(meta), meta.sampling
+        stated = entry.sha256, entry.rows, entry.segments, entry.fragments, self.index.labels, self.index.sampling
+        if found != stated:
             raise damaged(path, "it does not fit the index")
         return shard
 

@@ -93,12 +93,17 @@ class Labels(BaseModel):
         k_min: First k of the hulls.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     tail: TailName
     g: float
     metric: MetricName
     k_min: int
+
+    @classmethod
+    def of(cls, meta: ShardMeta) -> Labels:
+        """Those of a shard."""
+        return cls(tail=meta.tail, g=meta.g, metric=meta.metric, k_min=meta.k_min)
 
 
 class DatasetIndex(BaseModel):
@@ -195,6 +200,8 @@ def read_index(path: Path) -> DatasetIndex:
     """
     path = path / INDEX if path.is_dir() else path
     try:
+        if path.exists() and not path.is_file():  # a pipe or a device may never end
+            raise _damaged(path, "it is not a file")
         content = path.read_bytes()
     except FileNotFoundError as error:
         raise Problem(f"There is no index {path}.", "Name the folder of a data set.", ExitCode.NOT_FOUND) from error
@@ -249,7 +256,7 @@ def _entry(folder: Path, member: Member) -> tuple[ShardEntry, Labels, Sampling, 
         split=member.split,
         source=member.source,
     )
-    return entry, Labels(tail=meta.tail, g=meta.g, metric=meta.metric, k_min=meta.k_min), meta.sampling, count_type
+    return entry, Labels.of(meta), meta.sampling, count_type
 
 
 def _parsed(path: Path, content: bytes) -> DatasetIndex:
@@ -265,6 +272,8 @@ def _parsed(path: Path, content: bytes) -> DatasetIndex:
         if stated != _digest(described):
             raise _damaged(path, "its content does not match its checksum")
         index = DatasetIndex.model_validate(described)
+        if not index.shards:
+            raise _damaged(path, "it names no shard")
     except ValidationError as error:
         raise _damaged(path, f"{_places(error)} does not fit") from error
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:

@@ -58,7 +58,7 @@ class Descent:
         spent: Fragments of the steps equal to the threshold.
         slope: Error saved per fragment of the first of those steps, not rounded; 0 if there is none.
         error: float64, sums of the errors of the pixels that have no step in the window.
-        dual: float64, sums of `e_p(j)` at the j that minimise `e_p(j) + lambda j`.
+        dual: float64, sums of `e_p(j)` at the j that minimise `e_p(j) + lambda j`, and what rounding took from them.
         dual_k: Sum of those j.
         window: int64, pixels with a step in the window.
         outside: How many pixels have steps, but none in the window.
@@ -87,11 +87,11 @@ def descend(part: Part, end: Threshold, left: int) -> Descent:
     chunks = np.searchsorted(work, np.linspace(0, work[-1], _CHUNKS + 1)).astype(np.int64)
     steps = _Steps(part.curves.offsets, hulls.offsets, hulls.k, hulls.error, part.keys, hulls.k_min)
     k, flags = np.empty(pixels, dtype=np.int32), np.zeros(pixels, dtype=np.uint8)
-    error, dual, counts = np.zeros(_CHUNKS), np.zeros(_CHUNKS), np.zeros((_CHUNKS, 2), dtype=np.int64)
+    error, dual, counts = np.zeros(_CHUNKS), np.zeros((_CHUNKS, 2)), np.zeros((_CHUNKS, 2), dtype=np.int64)
     _walk(chunks, steps, (end.key, end.first, end.last, slope_of(end.key)), k, flags, error, dual, counts)
     spent, slope = _take_ties(np.flatnonzero(flags & _TIED), steps, end.key, left, k)
     dual_k, outside = counts.sum(axis=0)
-    return Descent(k, spent, slope, error, dual, int(dual_k), np.flatnonzero(flags), int(outside))
+    return Descent(k, spent, slope, error, dual.reshape(-1), int(dual_k), np.flatnonzero(flags), int(outside))
 
 
 def core_of(part: Part, pixels: NDArray[np.int64], k: NDArray[np.int32]) -> Core:
@@ -140,16 +140,16 @@ def _walk(
                 k[p] = min(steps.k_min, steps.curve_offsets[p + 1] - steps.curve_offsets[p] - 1)
                 fragments += k[p]
                 continue
-            chosen, cheapest, least, flag = begin, begin, np.inf, np.uint8(0)
+            chosen, cheapest, flag = begin, begin, np.uint8(0)
             for i in range(begin, after):
                 key = np.int64(steps.keys[i])
                 if key > last:
                     break
                 if key < threshold:
                     chosen = i
-                cost = np.float64(steps.error[i]) + lam * steps.vertex[i]
-                if cost < least:
-                    cheapest, least = i, cost
+                more = lam * (steps.vertex[i] - steps.vertex[cheapest])
+                if np.float64(steps.error[i]) - np.float64(steps.error[cheapest]) + more < 0.0:
+                    cheapest = i
                 if key >= first and i > begin:
                     flag |= np.uint8(_TIED if key == threshold else _WINDOW)
             k[p], flags[p] = steps.vertex[chosen], flag
@@ -164,7 +164,7 @@ def _walk(
                 total = error_sum + value
                 error_lost += (error_sum - total) + value if error_sum >= value else (value - total) + error_sum
                 error_sum = total
-        error[chunk], dual[chunk] = error_sum + error_lost, dual_sum + dual_lost
+        error[chunk], dual[chunk, 0], dual[chunk, 1] = error_sum + error_lost, dual_sum, dual_lost
         counts[chunk, 0], counts[chunk, 1] = fragments, outside
 
 

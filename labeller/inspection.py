@@ -166,7 +166,7 @@ class _Tally:
     def __init__(self) -> None:
         self._splits: dict[str, dict[str, int]] = {}
         self._assets: dict[str, set[str]] = {}
-        self._n = np.zeros(0, np.int64)
+        self._n: dict[int, int] = {}
         self._gains: dict[int, int] = {}
         self._shares: list[float] = []
         self._prices: list[float] = []
@@ -186,12 +186,8 @@ class _Tally:
         for name, count in counted.items():
             sums[name] += count
         self._assets.setdefault(split, set()).update({asset} - {""})
-        found = np.bincount(shard.n, minlength=len(self._n))
-        found[: len(self._n)] += self._n
-        self._n = found
-        powers, counts = np.unique(np.floor(np.log10(hull_slopes(shard))).astype(int), return_counts=True)
-        for power, count in zip(powers.tolist(), counts.tolist(), strict=True):
-            self._gains[power] = self._gains.get(power, 0) + count
+        _count(shard.n, self._n)
+        _count(np.floor(np.log10(hull_slopes(shard))).astype(int), self._gains)
         self._shares += [level.share for level in shard.meta.levels]
         self._prices += [x.log_lambda / math.log(10.0) for x in shard.meta.levels if x.log_lambda is not None]
 
@@ -221,15 +217,20 @@ def hull_slopes(shard: Shard) -> NDArray[np.float64]:
     return np.asarray(saved / np.diff(shard.hull_k)[inner], dtype=np.float64)
 
 
-def _n_bins(counts: NDArray[np.int64]) -> tuple[Bin, ...]:
+def _count(values: NDArray[np.integer], counts: dict[int, int]) -> None:
+    """Adds how often each value occurs."""
+    for value, count in zip(*(found.tolist() for found in np.unique(values, return_counts=True)), strict=True):
+        counts[value] = counts.get(value, 0) + count
+
+
+def _n_bins(counts: dict[int, int]) -> tuple[Bin, ...]:
     """Bins 1, 2, .. 8, then 9-16, 17-32, ..; from the least n that occurs to the greatest."""
-    occurring = np.flatnonzero(counts)
-    if not len(occurring):
+    if not counts:
         return ()
     edges = [*range(1, _SINGLE + 2)]
-    while edges[-1] <= occurring[-1]:
+    while edges[-1] <= max(counts):
         edges.append(2 * (edges[-1] - 1) + 1)
-    bins = _bins(edges, [int(counts[low:high].sum()) for low, high in pairwise(edges)])
+    bins = _bins(edges, [sum(counts[n] for n in counts if low <= n < high) for low, high in pairwise(edges)])
     return _trimmed(bins)
 
 

@@ -148,7 +148,8 @@ def _finished(state: _State, k_min: int) -> Allocation:
         core_k = solution.k
         proven = state.whole and solution.complete and solution.loss <= _margin(state)
     error = math.fsum([*state.error, *core.error[core.offsets[:-1] + core_k].astype(np.float64)])
-    dual = math.fsum(state.dual) + lam * (state.dual_k - state.budget)
+    # One exact sum: where nearly all steps of many pixels tie, the difference is far smaller than what it is of.
+    dual = math.fsum([*state.dual, lam * (state.dual_k - state.budget)])
     proven |= dual >= error * (1.0 - _SUMS_ROUNDED)
     # Rounded down: the bound must not lie above the least error. Where nothing better exists, the error is it.
     bound = error if proven else min(max(dual * (1.0 - 1e-15), 0.0), error)

@@ -13,20 +13,23 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
+import stat
 import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 from safetensors.numpy import save
 
-from labeller.columns import COLUMNS, CountType
+from labeller.columns import COLUMNS, Column, CountType
 
 BLOCK_ROWS: Final = 4096
 """Rows that share a checksum: about half a MiB, the least that is read to verify a row."""
@@ -62,6 +65,14 @@ class Layout(BaseModel):
     first_segments: tuple[int, ...]
     blocks: tuple[str, ...]
     view: dict[str, Any]
+
+    @model_validator(mode="after")
+    def _fits(self) -> Layout:
+        first, blocks = self.first_segments, -(-self.rows // self.block_rows)
+        ends = (len(self.blocks), len(first), *first[:1], *first[-1:]) == (blocks, blocks + 1, 0, self.segments)
+        if not ends or any(start > end for start, end in pairwise(first)):
+            raise ValueError("the blocks do not fit the rows")
+        return self
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +182,9 @@ class ShardFile:
         if os.fstat(descriptor).st_size != self._data + max(tensor.end for tensor in self._tensors.values()):
             raise Damage("its length is not the one it was written with")
         self.layout = Layout.model_validate(about)
+        for name, column in COLUMNS.items():
+            if not self._tensors[name].fits(column, self.layout):
+                raise Damage(f"its tensor {name} does not have the rows that its header says")
 
     @property
     def count_type(self) -> CountType:
@@ -196,16 +210,15 @@ class ShardFile:
             if _digest(block) != layout.blocks[first + number]:
                 begin = rows[0] + number * layout.block_rows
                 raise Damage(f"the rows from {begin} on do not match their checksum")
+            if len(block["hull_length"]) != block["hull_segments"].sum(dtype=np.int64):
+                raise Damage("its rows do not have the segments that they say")
         return _cut(read, start - rows[0], stop - rows[0])
 
     def _part(self, name: str, start: int, stop: int) -> NDArray[np.generic]:
         """Entries of a tensor's first axis, read from the disk."""
         tensor = self._tensors[name]
         out = np.empty((stop - start, *tensor.shape[1:]), dtype=tensor.dtype)
-        stride = out.dtype.itemsize * int(np.prod(tensor.shape[1:]))
-        if not 0 <= start <= stop <= tensor.shape[0] or tensor.end - tensor.begin != stride * tensor.shape[0]:
-            raise Damage(f"its tensor {name} does not have the rows that its header says")
-        self._fill(out, self._data + tensor.begin + start * stride)
+        self._fill(out, self._data + tensor.begin + start * out.dtype.itemsize * math.prod(tensor.shape[1:]))
         return out
 
     def _read(self, offset: int, count: int) -> NDArray[np.uint8]:
@@ -234,8 +247,10 @@ def open_columns(path: Path, expected: str | None = None) -> Iterator[ShardFile]
         Damage: The file is not what was written.
         OSError: It cannot be read.
     """
-    descriptor = os.open(path, os.O_RDONLY)
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # a pipe that nobody writes to would never open
     try:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise Damage("it is not a file")
         try:
             file = ShardFile(descriptor, expected)
         except (KeyError, TypeError, AttributeError, OverflowError, MemoryError, RecursionError) as error:
@@ -260,6 +275,14 @@ class _Tensor:
     def of(entry: Mapping[str, Any]) -> _Tensor:
         begin, end = entry["data_offsets"]
         return _Tensor(_TYPES[entry["dtype"]], tuple(map(int, entry["shape"])), int(begin), int(end))
+
+    def fits(self, column: Column, layout: Layout) -> bool:
+        """Whether it is that column of so many rows; its place then bounds its size by that of the file."""
+        types = (column.dtype, "uint32") if column.dtype == "uint16" else (column.dtype,)
+        entries = layout.rows if column.per == "row" else layout.segments
+        shape = (entries, len(column.fields)) if column.fields else (entries,)
+        size = np.dtype(self.dtype).itemsize * math.prod(shape)
+        return self.dtype in types and self.shape == shape and 0 <= self.begin == self.end - size
 
 
 def _blocks(columns: Columns, rows: int, block_rows: int, first_segments: list[int]) -> Iterator[Columns]:

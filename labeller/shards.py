@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from labeller.curves import Curves
 from labeller.hull import Hulls
@@ -50,10 +50,10 @@ class Level(BaseModel):
         bound: Lower bound of it.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     budget: int
-    share: float
+    share: float = Field(ge=0.0, le=1.0)
     scored: bool
     k_min: int
     log_lambda: float | None
@@ -78,17 +78,17 @@ class ShardMeta(BaseModel):
         levels: Optimal allocations, by rising budget.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    width: int
-    height: int
-    fragments: int
+    width: int = Field(ge=1)
+    height: int = Field(ge=1)
+    fragments: int = Field(ge=0)
     occupied: int
     eligible: int
     tail: TailName
     g: float
     metric: MetricName
-    k_min: int
+    k_min: int = Field(ge=0, le=1)
     sampling: Sampling
     levels: tuple[Level, ...]
 
@@ -257,7 +257,36 @@ def damaged(path: Path, why: object) -> Problem:
 def _read(path: Path, header_sha256: str | None, part: Callable[[ShardFile], tuple[int, int]]) -> Shard:
     with explained(path), open_columns(path, header_sha256) as file:
         meta = ShardMeta.model_validate(file.layout.view)
-        return _shard(file.read(*part(file)), meta)
+        shard = _shard(file.read(*part(file)), meta)
+        _check_values(shard)
+        return shard
+
+
+def _check_values(shard: Shard) -> None:
+    """Refuses numbers that no view has: sums only say that they are the ones that were written.
+
+    Raises:
+        Damage: Which ones.
+    """
+    meta, inner = shard.meta, np.ones(max(len(shard.hull_k) - 1, 0), dtype=bool)
+    has_hull = np.diff(shard.hull_offsets) > 0
+    last = shard.hull_offsets[1:][has_hull] - 1
+    inner[last[:-1]] = False  # from one row to the next
+    checks = {
+        "features that are not finite": np.isfinite(shard.features).all(),
+        "pixels that the view does not have": (np.diff(shard.pixel) > 0).all()
+        and shard.pixel.min(initial=0) >= 0
+        and shard.pixel.max(initial=0) < meta.width * meta.height,
+        "counts that the view does not have": shard.n.min(initial=meta.k_min + 1) > meta.k_min
+        and int(shard.n.sum(dtype=np.int64)) <= meta.fragments,
+        "hulls that are not in k_min..n": (np.diff(shard.hull_k)[inner] > 0).all()
+        and (shard.hull_k[last] <= shard.n[has_hull]).all(),
+        "errors that do not fall to 0": np.isfinite(shard.hull_error).all()
+        and (np.diff(shard.hull_error)[inner] < 0.0).all(),
+    }
+    wrong = [name for name, fits in checks.items() if not fits]
+    if wrong:
+        raise Damage(f"it has {', '.join(wrong)}")
 
 
 def _columns(dump: FragmentDump, hulls: Hulls, pixel: NDArray[np.int64]) -> Columns:

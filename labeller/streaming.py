@@ -7,24 +7,27 @@ with only one of them and its curves in memory. The results are those of the who
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
+from typing import get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labeller.allocation import Allocation
+from labeller.api import budgets_of
 from labeller.curves import Curves, error_curves
 from labeller.descent import Part, part_of
 from labeller.error_rules import ErrorRule, allocate_by_error
 from labeller.hull import lower_hulls
 from labeller.rules import each_budget
 from schemas.fragments import FragmentDump
+from schemas.problem import ExitCode, Problem
 from schemas.tail import DENSITY_G, MetricName, TailName
 
 
 def allocate_bands(
     bands: Callable[[], Iterable[FragmentDump]],
-    budgets: Sequence[int],
+    budgets: Iterable[int] | int,
     rule: ErrorRule = "optimal",
     *,
     tail: TailName = "density",
@@ -47,9 +50,11 @@ def allocate_bands(
         One allocation for each budget, in the order of `budgets`; k is that of all bands, one after the other.
 
     Raises:
-        Problem: If a band is malformed.
-        ValueError: If a budget is negative.
+        Problem: If a band is malformed, if a budget is no integer or negative, or if the rule is not one of the three.
     """
+    if rule not in get_args(ErrorRule):
+        rules = ", ".join(get_args(ErrorRule))
+        raise Problem(f"The rule '{rule}' does not work band by band.", f"Use one of {rules}.", ExitCode.USAGE)
     counts = [np.empty(0, dtype=np.int32), *(band.counts.astype(np.int32) for band in bands())]
     n: NDArray[np.int32] = np.concatenate(counts)
 
@@ -62,4 +67,4 @@ def allocate_bands(
 
         return allocate_by_error(rule, wanted, least, curves, parts, keep=False)
 
-    return each_budget(n, budgets, rule, k_min, short)
+    return each_budget(n, budgets_of(budgets), rule, k_min, short)

@@ -48,7 +48,7 @@ def inspect(
 
 def _show(found: Inspection) -> None:
     verified = "every shard verified against the index" if found.indexed else "no index: every shard verified by itself"
-    print(f"{plain(found.path)}: {verified}" + (f", code {found.code[:12]}" if found.code else ""))
+    print(f"{plain(found.path)}: {verified}" + (f", code {plain(found.code[:12])}" if found.code else ""))
     rows = [
         (
             name,

@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.logging import RichHandler
 
 from schemas.problem import ExitCode, Problem
+from services.cli.lines import plain
 
 
 def out() -> Console:
@@ -53,8 +54,8 @@ def show_problem(problem: Problem, *, as_json: bool) -> int:
     else:
         console = err()
         console.print("[bold red]error:[/] ", end="")
-        console.print(problem.title, markup=False)
-        console.print(problem.remedy, markup=False)
+        console.print(plain(problem.title), markup=False)  # with names and numbers out of other people's files
+        console.print(plain(problem.remedy), markup=False)
     return int(problem.code)
 
 

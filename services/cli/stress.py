@@ -35,6 +35,8 @@ def stress(
     from services.stress.findings import Options, Row
     from services.stress.suites import rows_of, selected
 
+    if markdown is not None:
+        report.check_markdown(markdown)  # minutes before there is anything to write
     options = Options(quick=quick, seed=seed, search=search)
     wanted = tuple(only or ())
     rows: list[Row] = []

@@ -82,6 +82,7 @@ def handmade(rng: np.random.Generator, quick: bool) -> list[tuple[str, Curves]]:
     spans = {
         "errors all equal": [np.full(m, 0.25) for m in n],
         "straight lines": [np.arange(m, 0, -1) / 16.0 for m in n],
+        "lines straight up to a rounding": [np.arange(m, 0, -1) * rng.random() for m in n],
         "errors of three values": [rng.choice([0.0, 0.5, 1.0], m) for m in n],
         "all errors 0": [np.zeros(m) for m in n],
         "errors from denormal to huge": [10.0 ** rng.uniform(-44.0, 37.0, m) for m in n],
@@ -233,12 +234,16 @@ def _rows_of(dump: FragmentDump, first: int, last: int) -> FragmentDump:
 
 
 def _bounds(options: Options) -> Iterator[Finding]:
-    """The certificate on small views, against exhaustive dynamic programming."""
+    """The certificate, against exhaustive dynamic programming, on small views and on one that is hard to prove."""
     rng = np.random.default_rng(options.seed)
     tries = 60 if options.quick else 1000
-    for name, ties in (("small views", False), ("small views, depth ties", True)):
+    for name, searches in (
+        ("small views", _searched(rng, tries, ties=False)),
+        ("small views, depth ties", _searched(rng, tries, ties=True)),
+        ("what fits the rest is far from the price", _far_away()),
+    ):
         with one_thread():
-            searched = list(_searched(rng, tries, ties))
+            searched = list(searches)
         optima = np.array([optimum for _, optimum, _ in searched])
         places = [place for _, _, place in searched]
         bounds = np.array([found.bound or 0.0 for found, _, _ in searched])
@@ -256,6 +261,15 @@ def _searched(rng: np.random.Generator, tries: int, ties: bool) -> Iterator[tupl
         for found in allocate_curves(dump, curves, edge_budgets(dump.counts), "optimal"):
             optimum = reference.optimum(_split(curves), found.budget, found.k_min)
             yield found, optimum, f"view {trial}, F {found.budget}"
+
+
+def _far_away() -> Iterator[tuple[Allocation, float, str]]:
+    """Pixels that gain by pairs of fragments only: what gains by an odd one is 1200 dearer fragments away."""
+    pairs = [np.array([9.0, 2.0, 2.0, 0.0]) * (1.0 + 1e-4 * i) for i in range(600)]
+    curves = _curves([*pairs, np.array([9.0, 0.9, 0.0])])
+    budgets = [len(curves.counts) + fragments for fragments in (1, 401, 601, 801)]
+    for found in allocate_curves(_dump_for(curves), curves, budgets, "optimal"):
+        yield found, reference.optimum(_split(curves), found.budget, found.k_min), f"F {found.budget}"
 
 
 def _rising(options: Options) -> Iterator[Finding]:

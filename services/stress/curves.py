@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from labeller import reference
 from labeller.curves import composite, error_curves, error_curves_by_g
-from renderer.csr import bin_fragments
+from renderer.csr import bin_fragments, sort_fragments
 from schemas.colour import linear_to_srgb
 from schemas.fragments import FragmentDump
 from schemas.tail import DENSITY_G, METRICS, TAILS, MetricName, TailName
@@ -165,7 +165,7 @@ def _through(level: int, n: int, kind: type[np.float32 | np.float64]) -> NDArray
 
 
 def _sorting(options: Options) -> Iterator[Finding]:
-    """Lists in random order, counted and sorted into runs of pixels, against a stable sort of everything."""
+    """Lists in random order, counted and sorted into runs of pixels, by both sorts, against a stable sort of all."""
     rng = np.random.default_rng(options.seed)
     fragments = 20_000 if options.quick else 200_000
     for name, depth, colour, pixels in (
@@ -177,8 +177,10 @@ def _sorting(options: Options) -> Iterator[Finding]:
         bits = depth.astype(np.float32).view(np.uint32).astype(np.uint64)
         keys = (bits << np.uint64(32)) | colour.astype(np.uint64)
         places = rng.integers(0, pixels, fragments, dtype=np.uint32)
-        _, found_colour, found_depth, _ = bin_fragments(keys, places << np.uint32(8), pixels)
+        offsets, found_colour, found_depth, _ = bin_fragments(keys, places << np.uint32(8), pixels)
         expected = keys[np.lexsort((keys, places))]
         found = (found_depth.view(np.uint32).astype(np.uint64) << np.uint64(32)) | found_colour.astype(np.uint64)
-        wrong = np.flatnonzero(found != expected)
+        runs = keys[np.argsort(places, kind="stable")]
+        sort_fragments(offsets, runs)
+        wrong = np.flatnonzero((found != expected) | (runs != expected))
         yield counted("csr", f"{name}, N {fragments}", len(wrong), f"fragment {wrong[0]}" if len(wrong) else "")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -62,6 +63,24 @@ def _finite(value: Any) -> Any:
 
 def _number(value: float) -> str:
     return "0" if value == 0.0 else f"{value:.2g}"
+
+
+def check_markdown(path: Path) -> None:
+    """Refuse a document that `write_markdown` could not write.
+
+    Raises:
+        Problem: There is none, it has not the marks, or it cannot be written.
+    """
+    if not path.is_file() or not os.access(path, os.W_OK):
+        raise Problem(
+            f"There is no document {path} that can be written.", "Name a Markdown file that has marks for the tables."
+        )
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise Problem(f"{path} is not text in UTF-8.", "Name a Markdown file that has marks for the tables.") from error
+    for mark in (MEASURED, BOUNDS):
+        _between(path, text, mark, "")
 
 
 def write_markdown(path: Path, rows: Sequence[Row]) -> None:

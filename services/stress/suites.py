@@ -75,7 +75,9 @@ def rows_of(suite: Listed, options: Options, only: Sequence[str] = ()) -> Iterat
     try:
         for row in suite.load()(options):
             wanted = not only or suite.name in only or any(_begins(row.path, name) for name in only)
-            if wanted or isinstance(row, Broken):
+            # A driver that is missing is said whichever of its paths were asked for.
+            whole = isinstance(row, NotRun) and not any(_begins(row.path, path) for path in suite.paths)
+            if wanted or whole or isinstance(row, Broken):
                 yield row
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] in _OURS:

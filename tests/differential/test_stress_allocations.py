@@ -94,3 +94,10 @@ def test_other_thresholds_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(allocations, "Histogram", Late)
     assert not any(row.ok for row in allocations._selections(np.random.default_rng(0)) if row.case == "random keys")
+
+
+def test_a_proof_without_a_search_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("labeller.optimal._margin", lambda _state: np.inf)
+    wrong = [row for row in allocations._bounds(QUICK) if not row.ok]
+    assert [row.path for row in wrong] == ["optimal.bound"]
+    assert wrong[0].case.startswith("what fits the rest is far from the price")

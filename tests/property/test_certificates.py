@@ -19,6 +19,7 @@ from labeller.error_rules import ErrorRule
 from labeller.rules import allocate_curves
 from labeller.streaming import allocate_bands
 from schemas.fragments import FragmentDump
+from schemas.problem import Problem
 from schemas.tail import METRICS, MetricName
 
 
@@ -83,6 +84,29 @@ def test_the_bound_never_exceeds_the_optimum_in_three_thousand_random_cases() ->
     assert all(proven)
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("core_problem._STATES", 40), ("core_problem._WORK", 200), ("optimal._PIXELS", 3), ("optimal._AROUND", (1, 5))],
+)
+def test_a_search_that_may_not_look_at_everything_claims_no_more_than_it_saw(
+    name: str, value: int | tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(f"labeller.{name}", value)
+    rng = np.random.default_rng(1)
+    proven = []
+    for case in range(300):
+        curves = random_curves(rng, case % 6)
+        proven += [x.proven for x in check(curves, [int(rng.integers(0, int(curves.counts.sum()) + 1))], case % 2)]
+    assert 0 < sum(proven) < len(proven)
+
+
+def test_the_one_pixel_that_gains_is_found_among_many_that_could_change_alike() -> None:
+    # All steps tie in float32, but the last pixel's saves a little more than those that were taken before it.
+    curves = curves_of([*[[1.0, 0.0]] * 30, [1 + 2**-23, 2**-23 - 2e-8, 0.0]])
+    (found,) = check(curves, [10], k_min=0)
+    assert found.k[-1] == 1
+
+
 errors = st.one_of(st.sampled_from([0.0, 0.25, 0.5, 1.0, 2.0]), st.floats(0.0, 4.0, width=32))
 curve_lists = st.lists(st.lists(errors, max_size=9).map(lambda e: [*e, 0.0]), min_size=1, max_size=8)
 
@@ -101,6 +125,27 @@ def test_views_of_hundreds_of_pixels_reach_the_optimum_exactly(seed: int, k_min:
     total = int(curves.counts.sum())
     found = check(curves, [int(share * total) for share in (0.25, 0.4, 0.6, 0.8)], k_min)
     assert all(x.proven and x.gap == 0.0 for x in found)
+
+
+@pytest.mark.parametrize("n", [1, 10_000, 300_000])
+def test_a_small_loss_next_to_the_cost_of_a_long_list_still_counts(n: int) -> None:
+    # Both steps cost the same as far as float32 knows; only the second pixel's leaves nothing behind.
+    curves = curves_of([[*[9.0 * n] * n, 1.0, 1e-9, 0.0], [*[9.0 * n] * n, 1.0, 0.0]])
+    (found,) = allocate_curves(dump_for(curves), curves, [2 * n + 1], "optimal", k_min=0)
+    assert found.k.tolist() == [n, n + 1]
+    assert found.error == 1.0
+    assert found.proven
+
+
+def test_the_dual_bound_of_long_lists_is_not_rounded_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("labeller.optimal._PIXELS", 0)  # the bound is that of the price alone
+    n, most = 300_000, 9.0 * 300_000
+    curves = curves_of([[*[most] * n, 1.0, 0.0]] * 2 + [[*[most] * n, 1 + 2**-23, 2**-23 - 2e-11, 0.0]])
+    best = 1.0 + float(np.float32(2**-23 - 2e-11))
+    (found,) = allocate_curves(dump_for(curves), curves, [3 * n + 2], "optimal", k_min=0)
+    assert found.lam == 1.0
+    assert 1 - 1e-12 < (found.bound or 0.0) / best <= 1 + 1e-14
+    assert not found.proven
 
 
 def test_equal_pixels_by_the_thousand_are_no_trouble() -> None:
@@ -161,6 +206,12 @@ def test_row_bands_give_what_the_whole_view_gives(dump: FragmentDump, rows: int,
         assert found.error == pytest.approx(expected.error, rel=1e-12)
         assert (found.k_min, found.exact, found.used) == (expected.k_min, expected.exact, expected.used)
         assert found.bound == (None if rule != "optimal" else pytest.approx(expected.bound, rel=1e-9))
+
+
+def test_row_bands_refuse_what_they_cannot_do() -> None:
+    for budgets, rule in (([5], "fixed"), ([2.5], "optimal"), ([-1], "greedy")):
+        with pytest.raises(Problem):
+            allocate_bands(lambda: bands_of(random_dump(4, 4, 3, seed=0), 2), budgets, rule)  # type: ignore[arg-type]
 
 
 @settings(max_examples=60, deadline=None)

@@ -68,6 +68,33 @@ def test_budgets_of_numpy_and_lists_of_python_are_fine() -> None:
     assert np.array_equal(a.k, b.k)
 
 
+def test_budgets_may_come_one_by_one() -> None:
+    given = labeller.allocate(DUMP, [9, 30])
+    for budgets in ((x for x in (9, 30)), np.array([9, 30], ">u2"), range(9, 31, 21)):
+        assert [x.k.tolist() for x in labeller.allocate(DUMP, budgets)] == [x.k.tolist() for x in given]
+
+
+def test_arrays_of_other_layouts_give_the_same_and_stay_as_they_are() -> None:
+    strided = np.zeros((2 * DUMP.total, 8), np.uint8)
+    strided[::2, ::2] = DUMP.rgba
+    given = {
+        "offsets": DUMP.offsets.astype(np.uint64),
+        "rgba": strided[::2, ::2],
+        "depth": DUMP.depth.astype(">f8"),
+        "background": np.asfortranarray(DUMP.background),
+        "facing": DUMP.facing[::-1][::-1],
+    }
+    before = {name: value.copy() for name, value in given.items()}
+    for value in given.values():
+        value.flags.writeable = False
+    weights = np.linspace(1.0, 2.0, DUMP.pixels).astype(np.float16)
+    for rule in labeller.RULES:
+        ((found,), (expected,)) = (labeller.allocate(x, 40, rule, weights=weights) for x in (given, DUMP))
+        if rule != "importance":  # which goes by the picture's size, and that is not given here
+            assert np.array_equal(found.k, expected.k)
+    assert all(np.array_equal(value, before[name]) for name, value in given.items())
+
+
 def test_k_min_0_may_leave_a_pixel_to_its_tail() -> None:
     budget = int(1.2 * np.count_nonzero(DUMP.counts))
     ((one,), (none,)) = (labeller.allocate(DUMP, [budget], k_min=k) for k in (1, 0))
@@ -120,6 +147,18 @@ NAN = np.full_like(DUMP.depth, np.nan)
         (changed("rgba", OPAQUE), "alpha 255"),
         (changed("counts", DUMP.counts + 0.5), "counts is of type float64"),
         (changed("counts", -DUMP.counts), "counts does not say"),
+        (changed("counts", [[1], [2, 3]]), "counts is not an array"),
+        (changed("counts", [2**62] * 4 + [DUMP.total]), "counts does not say"),
+        (changed("counts", np.ma.array(DUMP.counts, mask=DUMP.counts > 1)), "counts has masked entries"),
+        (changed("rgba", np.ma.array(DUMP.rgba, mask=DUMP.rgba > 9)), "rgba has masked entries"),
+        (changed("depth", DUMP.depth.astype(np.float64) * 1e300), "not positive numbers"),
+        (changed("shape", (9.0, 12.0)), "has no integers"),
+        (changed("shape", "9x12"), "has no integers"),
+        (changed("background", 255), "background has the shape ()"),
+        (changed("background", []), "background has the shape (0,)"),
+        (changed("background", DUMP.background.reshape(12, 9, 3)), "background has the shape (12, 9, 3)"),
+        ({**arrays(), 3: 1}, "have 3, background"),
+        ([DUMP.rgba], "of type list"),
         (changed("shape", (5, 5)), "The shape (5, 5) is not that of 108 pixels"),
         (changed("background", np.zeros((3, 3), np.uint8)), "background has the shape"),
         (changed("facing", np.zeros(DUMP.pixels)), "facing is of type"),
@@ -138,13 +177,27 @@ def test_arrays_that_do_not_fit_are_refused_by_name(fragments: dict[str, Any], s
         ({"rule": "best"}, "no rule 'best'"),
         ({"tail": "none"}, "no tail 'none'"),
         ({"metric": "ssim"}, "no metric 'ssim'"),
+        ({"fill": "even"}, "no fill 'even'"),
+        ({"rule": np.array(["greedy", "fixed"])}, "no rule"),
+        ({"vkb": None}, "vkb is of type NoneType"),
         ({"k_min": 2}, "k_min is 2"),
+        ({"k_min": np.array([0, 1])}, "k_min is"),
+        ({"g": "steep"}, "g is"),
+        ({"g": [0.5, 1.0]}, "g is"),
+        ({"g": "steep", "tail": "paper"}, "g is"),
         ({"g": -1.0}, "g is"),
         ({"g": float("nan")}, "g is"),
         ({"weights": np.ones(3)}, "3 weights for 108 pixels"),
         ({"weights": np.full(108, -1.0)}, "weights"),
         ({"weights": np.full(108, np.inf)}, "weights"),
         ({"weights": np.full(108, 1e-30)}, "1e-9"),
+        ({"weights": ["a"] * 108}, "weights is of type"),
+        ({"weights": np.ones((12, 9))}, "weights has the shape (12, 9)"),
+        ({"weights": np.ma.array(np.ones(108), mask=np.arange(108) > 50)}, "weights has masked entries"),
+        ({"budgets": [True]}, "not a whole number"),
+        ({"budgets": "12"}, "not a whole number"),
+        ({"budgets": np.array([[1, 2]])}, "not a whole number"),
+        ({"budgets": np.ma.array([1, 2], mask=[True, False])}, "masked"),
         ({"budgets": [-1]}, "negative"),
         ({"budgets": [1.5]}, "not a whole number"),
     ],

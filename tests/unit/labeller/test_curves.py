@@ -87,6 +87,11 @@ def test_lists_that_do_not_fit_are_refused() -> None:
         replace(dump, offsets=np.array([0, 1, 2])),
         replace(dump, rgba=dump.rgba[:1]),
         replace(dump, background=dump.background[:0]),
+        replace(dump, facing=dump.facing[:0]),
+        replace(dump, rgba=dump.rgba[:, :3]),
+        replace(dump, rgba=dump.rgba.astype(np.int64)),
+        replace(dump, depth=dump.depth.astype(">f4")),
+        replace(dump, offsets=dump.offsets.astype(np.uint64)),
     ):
         with pytest.raises(Problem, match="malformed"):
             composite(broken, np.zeros(1, int))

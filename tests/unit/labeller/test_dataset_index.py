@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import threading
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -13,7 +15,7 @@ import pytest
 from support.shards import CODE, member, random_dataset, random_shard
 
 from labeller.dataset import Dataset, open_dataset, read_ahead
-from labeller.dataset_index import INDEX, read_index, write_index
+from labeller.dataset_index import INDEX, DatasetIndex, read_index, write_index
 from labeller.shards import read_shard
 from schemas.problem import ExitCode, Problem
 
@@ -203,3 +205,32 @@ def test_reading_ahead_is_bounded_and_keeps_order() -> None:
     assert next(found) == 0
     assert len(begun) <= 4
     assert list(found) == [n * n for n in range(1, 100)]
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        lambda index: {"labels": index.labels.model_copy(update={"metric": "linear"})},
+        lambda index: {"sampling": index.sampling.model_copy(update={"seed": 9})},
+        lambda index: {"shards": tuple(entry.model_copy(update={"fragments": 1}) for entry in index.shards)},
+    ],
+)
+def test_an_index_that_says_what_the_shards_do_not_is_found_by_the_check(
+    folder: Path, wrong: Callable[[DatasetIndex], dict[str, object]]
+) -> None:
+    index = read_index(folder)
+    (folder / INDEX).write_text(index.model_copy(update=wrong(index)).text)
+    dataset = open_dataset(folder)
+    with pytest.raises(Problem, match="does not fit the index"):
+        dataset.check(dataset.index.shards[0])
+
+
+def test_an_index_of_nothing_and_one_that_is_no_file_are_refused(folder: Path) -> None:
+    index = read_index(folder)
+    (folder / INDEX).write_text(index.model_copy(update={"shards": ()}).text)
+    with pytest.raises(Problem, match="it names no shard"):
+        read_index(folder)
+    (folder / INDEX).unlink()
+    os.mkfifo(folder / INDEX)
+    with pytest.raises(Problem, match="it is not a file"):
+        read_index(folder)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
+import os
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -188,12 +191,84 @@ def test_lists_longer_than_65535_need_wider_columns(tmp_path: Path) -> None:
     random_shard(tmp_path / "view")
     with open_columns(tmp_path / "view") as file:
         view = file.layout.view
-    write_columns(tmp_path / "wide", columns, view)
+    write_columns(tmp_path / "wide", columns, {**view, "fragments": 70_002})
     shard = read_shard(tmp_path / "wide")
     np.testing.assert_array_equal(shard.n, [70_000, 2])
     np.testing.assert_array_equal(shard.hull_k, [1, 69_001, 69_901])
     np.testing.assert_array_equal(shard.hull_error, np.array([0.5, 0.25, 0.0], np.float32))
     np.testing.assert_array_equal(shard.hull_offsets, [0, 3, 3])
+
+
+@pytest.mark.parametrize(
+    ("column", "where", "value", "words"),
+    [
+        ("features", (3, 3), np.nan, "features that are not finite"),
+        ("features", (3, 3), np.inf, "features that are not finite"),
+        ("hull_error", 0, np.nan, "errors that do not fall"),
+        ("hull_error", 0, np.inf, "errors that do not fall"),
+        ("hull_error", 0, -1.0, "errors that do not fall"),
+        ("hull_error", 0, 0.0, "errors that do not fall"),
+        ("hull_length", 0, 0, "hulls that are not in"),
+        ("hull_length", 0, 60_000, "hulls that are not in"),
+        ("hull_segments", 3, 60_000, "segments that they say"),
+        ("n", 0, 0, "counts that the view"),
+        ("n", slice(None), 65_535, "counts that the view"),
+        ("pixel", -1, 40 * 30, "pixels that the view"),
+        ("pixel", 1, 0, "pixels that the view"),
+        ("pixel", -1, 2**32 - 1, "pixels that the view"),
+    ],
+)
+def test_numbers_that_no_view_has_are_refused_though_their_sums_fit(
+    path: Path, tmp_path: Path, column: str, where: Any, value: float, words: str
+) -> None:
+    with open_columns(path) as file:
+        columns, view = file.read(0, file.layout.rows), file.layout.view
+    columns[column][where] = value
+    write_columns(tmp_path / "wrong", columns, view)
+    with pytest.raises(Problem, match=f"wrong is damaged: .*{words}"):
+        read_shard(tmp_path / "wrong")
+
+
+@pytest.mark.parametrize(
+    ("layout", "tensors"),
+    [
+        ({"rows": 10**30}, {}),
+        ({"rows": 0, "segments": 0, "first_segments": [0], "blocks": []}, {}),
+        ({"block_rows": 1}, {}),
+        ({"blocks": []}, {}),
+        ({"first_segments": []}, {}),
+        ({"first_segments": [10**9, 0]}, {}),
+        ({"first_segments": [-5, 0]}, {}),
+        ({}, {"features": {"dtype": "F32", "shape": [10**12, 26], "data_offsets": [0, 104 * 10**12]}}),
+        ({}, {"features": {"dtype": "F32", "shape": [1, 10**12], "data_offsets": [0, 4]}}),
+        ({}, {"n": {"dtype": "U16", "shape": [], "data_offsets": [0, 2]}}),
+        ({}, {"n": {"dtype": "F32", "shape": [1], "data_offsets": [0, 4]}}),
+        ({}, {"pixel": None}),
+    ],
+)
+def test_a_header_that_fits_its_sum_but_not_its_rows_is_refused(
+    path: Path, tmp_path: Path, layout: dict[str, Any], tensors: dict[str, Any]
+) -> None:
+    content = path.read_bytes()
+    size = 8 + int.from_bytes(content[:8], "little")
+    header = json.loads(content[8:size])
+    about = json.dumps({**json.loads(header["__metadata__"]["shard"]), **layout})
+    header |= {"__metadata__": {"shard": about}, **tensors}
+    text = json.dumps({name: entry for name, entry in header.items() if entry is not None}).encode()
+    data, prefix = bytearray(content[size:]), len(text).to_bytes(8, "little")
+    begin, end = header["header_sha256"]["data_offsets"]
+    data[begin:end] = hashlib.sha256(prefix + text).digest()
+    (tmp_path / "wrong").write_bytes(prefix + text + data)
+    with pytest.raises(Problem, match="wrong is damaged: its"):
+        read_shard(tmp_path / "wrong")
+
+
+def test_a_pipe_and_a_folder_are_no_shards(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "folder").mkdir()
+    for name in ("pipe", "folder"):
+        with pytest.raises(Problem, match=f"{name} is damaged: it is not a file"):
+            read_shard(tmp_path / name)
 
 
 def test_readers_see_the_old_shard_or_the_new_one_while_it_is_replaced(tmp_path: Path) -> None:

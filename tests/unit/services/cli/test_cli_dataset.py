@@ -56,3 +56,9 @@ def test_damage_is_named_and_fails(made: Path, tmp_path: Path, capsys: pytest.Ca
     assert captured.out == ""
     assert f"error: The label shard {damaged} is damaged" in captured.err
     assert run(["dataset", "inspect", str(tmp_path / "nowhere")]) == ExitCode.NOT_FOUND
+
+
+def test_names_in_errors_do_not_command_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["dataset", "inspect", str(tmp_path / "\x1b]0;title\x07\x1b[31mred")]) == ExitCode.NOT_FOUND
+    assert "\x1b" not in (told := capsys.readouterr().err)
+    assert "title" in told

@@ -111,3 +111,13 @@ def test_markdown_is_written(tmp_path: Path) -> None:
     assert run(["stress", "--quick", "--only", "csr", "--markdown", str(document)]) == ExitCode.OK
     assert "| csr | random, N 20000 | 0 | 0 | nowhere | 0 absolute | ok |" in document.read_text()
     assert run(["stress", "--quick", "--only", "csr", "--markdown", str(tmp_path / "none.md")]) != ExitCode.OK
+
+
+@pytest.mark.parametrize("content", [None, b"no marks", b"\xff\xfe"])
+def test_a_document_that_cannot_be_written_is_refused_before_anything_is_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes | None
+) -> None:
+    monkeypatch.setattr(Listed, "load", lambda self: pytest.fail("a suite was run"))
+    document = tmp_path / "STRESS.md"
+    document.mkdir() if content is None else document.write_bytes(content)
+    assert run(["stress", "--quick", "--only", "csr", "--markdown", str(document)]) == ExitCode.USAGE

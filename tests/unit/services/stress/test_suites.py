@@ -75,6 +75,11 @@ def test_rows_of_other_paths_are_left_out_but_failures_never(monkeypatch: pytest
     assert isinstance(run_of(monkeypatch, ValueError(), only=("a",))[-1], Broken)
 
 
+def test_a_missing_driver_is_said_whichever_of_its_paths_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, part = NotRun("gl · zink", "no driver"), NotRun("b", "no library")
+    assert run_of(monkeypatch, whole, part, only=("a",)) == [whole]
+
+
 def test_naming_the_suites_imports_none_of_what_they_need() -> None:
     heavy = "{'torch', 'onnx', 'onnxruntime', 'moderngl', 'numba', 'pxr'}"
     code = f"import sys, services.stress.suites; sys.exit(bool({heavy} & set(sys.modules)))"
