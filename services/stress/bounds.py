@@ -23,12 +23,18 @@ BOUNDS: Final[dict[str, Bound]] = {
         "are compared with is right to this. 4096 products and sums of numbers up to 1 lose 4096 x 2^-52 = 9e-13.",
     ),
     "transmittance": Bound(
-        5e-4,
+        1e-7,
         "relative",
         1e-37,
-        "`T` as the running product in float32, as shaders have it: two roundings a factor, 4096 x (2^-24 + 2^-25) = "
-        "4e-4, and 2^-25 x 255 for each of the 15 factors 1/255 until `T` is below the floor, the least normal "
-        "float32, where drivers may flush to 0.",
+        "`T` as pictures have it: a white background behind black fragments. The running product is float64, the "
+        "picture float32: 2^-24 = 6e-8. The floor is near the least normal float32.",
+    ),
+    "transmittance.float32": Bound(
+        INFORMATION,
+        "relative",
+        1e-37,
+        "`T` as the running product in float32, as shaders have it; the rows of GL paths judge it. Two roundings a "
+        "factor: 4096 x (2^-24 + 2^-25) = 4e-4 at most.",
     ),
     "transmittance.rejected": Bound(
         INFORMATION,
@@ -42,7 +48,7 @@ BOUNDS: Final[dict[str, Bound]] = {
         "relative",
         CURVE_FLOOR,
         "Arithmetic is float64, storage float32: half a unit in the last place is 2^-24 = 6e-8; the rest is for the "
-        "table that stands for the sRGB curve. The floor is a difference of 1e-6 in display values.",
+        "polynomial that stands for the sRGB curve. The floor is a difference of 1e-6 in display values.",
     ),
     "curves.search": Bound(1e-7, "relative", CURVE_FLOOR, "The same for the worst list that a search finds."),
     "curves.weights": Bound(

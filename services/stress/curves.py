@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Final
@@ -17,7 +17,7 @@ from schemas.colour import linear_to_srgb
 from schemas.fragments import FragmentDump
 from schemas.tail import DENSITY_G, METRICS, TAILS, MetricName, TailName
 from services.stress.bounds import counted, within
-from services.stress.cases import LONGEST, Case, curve_cases
+from services.stress.cases import LONGEST, Case, curve_cases, dump_of
 from services.stress.findings import Finding, Options, worst_of
 from services.stress.twins import exact_transmittance, extended_composite
 
@@ -139,7 +139,7 @@ def _reference(options: Options) -> Iterator[Finding]:
 
 
 def _transmittance() -> Iterator[Finding]:
-    """The running product in float32, and the formula that METHOD section 2 rejects, in float32 and float64."""
+    """What comes through a list; beside it the product in float32, and the formula that METHOD section 2 rejects."""
     for name, level, n in (
         ("1/255", 1, LONGEST),
         ("1/255", 1, 256),
@@ -150,12 +150,22 @@ def _transmittance() -> Iterator[Finding]:
         case, step = f"alpha {name}, n {n}", max(n // 64, 1)
         truth = np.array([float(exact_transmittance(level, i)) for i in range(0, n + 1, step)])
         places = [f"k {i}" for i in range(0, n + 1, step)]
-        yield within("transmittance", case, _through(level, n, np.float32)[::step], truth, places)
+        yield within("transmittance", case, _seen_through(level, range(0, n + 1, step)), truth, places)
+        yield within("transmittance.float32", case, _through(level, n, np.float32)[::step], truth, places)
         for kind in (np.float32, np.float64):
             through = _through(level, n, kind)
             seen = (kind(level / 255.0) * through[:-1]).astype(kind)
             rejected = 1 - np.concatenate([np.zeros(1, kind), np.cumsum(seen, dtype=kind)])
             yield within("transmittance.rejected", f"{case}, {np.dtype(kind)}", rejected[::step], truth, places)
+
+
+def _seen_through(level: int, counts: Sequence[int]) -> NDArray[np.float32]:
+    """What the pictures of the labeller leave of white behind so many black fragments, for each count."""
+    lists = [
+        (np.tile(np.array([0, 0, 0, level], np.uint8), (n, 1)), np.arange(1, n + 1, dtype=np.float32)) for n in counts
+    ]
+    dump = dump_of(lists, (255, 255, 255))
+    return composite(dump, dump.counts)[:, 0]
 
 
 def _through(level: int, n: int, kind: type[np.float32 | np.float64]) -> NDArray[np.floating]:
