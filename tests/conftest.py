@@ -14,6 +14,7 @@ from support.s3 import S3Server, environment
 from renderer.context import gl_context
 from services.settings import Settings
 from services.storage import Storage, open_storage
+from services.stress.threads import one_thread
 
 Machine = Callable[[str], Storage]
 """Opens one storage as a machine of the given name does."""
@@ -26,6 +27,13 @@ settings.load_profile("diaphane")
 def pytest_addoption(parser: pytest.Parser) -> None:
     """`--golden` writes the golden pictures anew."""
     parser.addoption("--golden", action="store_true", help="write the golden pictures anew")
+
+
+@pytest.fixture(scope="module")
+def single_thread() -> Iterator[None]:
+    """For thousands of tiny calls: threads of compiled code would only wait for each other."""
+    with one_thread():
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,14 +15,7 @@ from labeller.rules import allocate_curves
 from schemas.fragments import FragmentDump
 from schemas.tail import METRICS, TAILS, MetricName, TailName
 
-
-@pytest.fixture(autouse=True, scope="module")
-def _one_thread() -> Iterator[None]:
-    """Thousands of tiny calls: threads would only wait for each other."""
-    threads = numba.get_num_threads()
-    numba.set_num_threads(1)
-    yield
-    numba.set_num_threads(threads)
+pytestmark = pytest.mark.usefixtures("single_thread")
 
 
 dumps = st.builds(

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,14 +9,7 @@ from hypothesis import strategies as st
 
 from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
 
-
-@pytest.fixture(autouse=True, scope="module")
-def _one_thread() -> Iterator[None]:
-    """Thousands of tiny calls: threads would only wait for each other."""
-    threads = numba.get_num_threads()
-    numba.set_num_threads(1)
-    yield
-    numba.set_num_threads(threads)
+pytestmark = pytest.mark.usefixtures("single_thread")
 
 
 counts = st.lists(st.one_of(st.integers(0, 6), st.sampled_from([0, 1, 4096])), min_size=1, max_size=12)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -22,14 +19,7 @@ from schemas.fragments import FragmentDump
 from schemas.problem import Problem
 from schemas.tail import METRICS, MetricName
 
-
-@pytest.fixture(autouse=True, scope="module")
-def _one_thread() -> Iterator[None]:
-    """Thousands of tiny calls: threads would only wait for each other."""
-    threads = numba.get_num_threads()
-    numba.set_num_threads(1)
-    yield
-    numba.set_num_threads(threads)
+pytestmark = pytest.mark.usefixtures("single_thread")
 
 
 def dual_bound(curves: Curves, lam: float, budget: int, k_min: int) -> float:
