@@ -116,7 +116,8 @@ def test_a_cancelled_job_ends_at_every_stage_and_a_retry_goes_on(arena: Arena) -
             line = arena.reached(point)
             arena.service.jobs.cancel(job_id)
             if "artifact" in line:
-                until(lambda pid=line["pid"]: not alive(pid), 5.0)
+                # Two workers of a role may both have a task there.
+                until(lambda at=point: not any(map(alive, _children_at(arena, at))), 5.0)
             arena.open(point)
             (job,) = arena.wait(job_id)
             assert job.state == "cancelled"
@@ -157,6 +158,11 @@ def _tear(arena: Arena, job_id: str, stage: str, name: str) -> None:
     task = arena.service.jobs.tasks(job_id, stage=stage)[-1]
     path = arena.service.storage.store.fetch(task.artifact) / name
     os.truncate(path, path.stat().st_size // 2)
+
+
+def _children_at(arena: Arena, point: str) -> set[int]:
+    """Processes of tasks that came to a point since the gates were shut."""
+    return {line["pid"] for line in arena.trace()[arena.mark :] if line["point"] == point and "artifact" in line}
 
 
 def _artifacts(arena: Arena) -> set[str]:
