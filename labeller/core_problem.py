@@ -66,7 +66,7 @@ def solve_core(core: Core, lam: float, left: int) -> Solution:
     """
     loss = _losses(core, lam)
     k = core.base.copy()
-    spent = _spend(core, loss, lam, left, k)
+    spent = _spend(core, left, k)
     best = _total(core, loss, k) + lam * (left - spent)
     pixels, first, last, changes = _participants(core, loss, best, left)
     reach = changes * int(max(last.max(initial=0), -first.min(initial=0)))
@@ -145,7 +145,7 @@ def _total(core: Core, loss: NDArray[np.float64], k: NDArray[np.int32]) -> float
 
 
 @njit(cache=True, error_model="numpy")
-def _spend(core: Core, loss: NDArray[np.float64], lam: float, left: int, k: NDArray[np.int32]) -> int:
+def _spend(core: Core, left: int, k: NDArray[np.int32]) -> int:
     """Greedily: the upgrades that save most per fragment and fit, one a pixel; or the one that saves most in all."""
     rates, costs = np.zeros(len(k)), np.zeros(len(k), dtype=np.int64)
     largest, pixel, cost = np.float64(0.0), -1, 0

@@ -28,12 +28,14 @@ class Part:
         hulls: The lower hulls of those.
         keys: uint32 [M], order of the steps that lead to the hulls' vertices: falling slopes.
         lengths: int32 [M], fragments of the steps.
+        chunks: int64, bounds of runs of pixels with about as many vertices, which threads take.
     """
 
     curves: Curves
     hulls: Hulls
     keys: NDArray[np.uint32]
     lengths: NDArray[np.int32]
+    chunks: NDArray[np.int64]
 
 
 def part_of(curves: Curves, hulls: Hulls) -> Part:
@@ -41,7 +43,9 @@ def part_of(curves: Curves, hulls: Hulls) -> Part:
     slopes, lengths = hulls.steps()
     keys = slopes.view(np.uint32)
     np.bitwise_xor(keys, np.uint32(0x7FFFFFFF), out=keys)  # floats that are not negative, in falling order
-    return Part(curves, hulls, keys, lengths)
+    work = hulls.offsets + np.arange(len(hulls.offsets))
+    chunks = np.searchsorted(work, np.linspace(0, work[-1], _CHUNKS + 1)).astype(np.int64)
+    return Part(curves, hulls, keys, lengths, chunks)
 
 
 def slope_of(key: int) -> float:
@@ -83,12 +87,10 @@ def descend(part: Part, end: Threshold, left: int) -> Descent:
         left: Fragments that steps equal to the threshold may take; they get them by pixel index.
     """
     hulls, pixels = part.hulls, len(part.hulls.offsets) - 1
-    work = hulls.offsets + np.arange(pixels + 1)
-    chunks = np.searchsorted(work, np.linspace(0, work[-1], _CHUNKS + 1)).astype(np.int64)
     steps = _Steps(part.curves.offsets, hulls.offsets, hulls.k, hulls.error, part.keys, hulls.k_min)
     k, flags = np.empty(pixels, dtype=np.int32), np.zeros(pixels, dtype=np.uint8)
     error, dual, counts = np.zeros(_CHUNKS), np.zeros((_CHUNKS, 2)), np.zeros((_CHUNKS, 2), dtype=np.int64)
-    _walk(chunks, steps, (end.key, end.first, end.last, slope_of(end.key)), k, flags, error, dual, counts)
+    _walk(part.chunks, steps, (end.key, end.first, end.last, slope_of(end.key)), k, flags, error, dual, counts)
     spent, slope = _take_ties(np.flatnonzero(flags & _TIED), steps, end.key, left, k)
     dual_k, outside = counts.sum(axis=0)
     return Descent(k, spent, slope, error, dual.reshape(-1), int(dual_k), np.flatnonzero(flags), int(outside))
@@ -103,10 +105,11 @@ def core_of(part: Part, pixels: NDArray[np.int64], k: NDArray[np.int32]) -> Core
         k: int32 [P], where the part's pixels stand.
     """
     curves = part.curves
-    counts = curves.counts[pixels]
-    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(counts + 1)])
-    where = np.arange(offsets[-1]) + np.repeat(curves.offsets[pixels] - offsets[:-1], counts + 1)
-    least = np.minimum(counts, part.hulls.k_min).astype(np.int32)
+    first = curves.offsets[pixels]
+    sizes = curves.offsets[pixels + 1] - first
+    offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
+    where = np.arange(offsets[-1]) + np.repeat(first - offsets[:-1], sizes)
+    least = np.minimum(sizes - 1, part.hulls.k_min).astype(np.int32)
     return Core(offsets, curves.error[where], k[pixels], least)
 
 

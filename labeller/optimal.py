@@ -132,7 +132,7 @@ def _go_on(state: _State, part: Part) -> None:
     state.dual_k += here.dual_k
     state.outside += here.outside
     room = _PIXELS - sum(len(pixels) for pixels, _ in state.core)
-    ends = np.cumsum(part.curves.counts[here.window] + 1)
+    ends = np.cumsum(part.curves.offsets[here.window + 1] - part.curves.offsets[here.window])
     taken = min(room, int(np.searchsorted(ends, _ERRORS, side="right")))
     chosen, others = here.window[:taken], here.window[taken:]
     state.core.append((chosen, core_of(part, chosen, here.k)))

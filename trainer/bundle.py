@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from schemas.bundle import (
     WEIGHTS,
     FeatureSpec,
     Manifest,
+    ParityReport,
     Provenance,
     TailSpec,
     file_spec,
@@ -90,6 +92,20 @@ def export_bundle(
     """
     from trainer.parity import check  # torch and onnxruntime take seconds to import; reading a bundle needs neither
 
+    return write_bundle(folder, weights, description, lambda: check(weights, folder, features, ctx))
+
+
+def write_bundle(
+    folder: Path, weights: Weights, description: Description, compared: Callable[[], ParityReport]
+) -> Manifest:
+    """Write a bundle's files; the manifest comes last.
+
+    Args:
+        folder: Empty or not yet there.
+        weights: The network.
+        description: What the manifest says beside it.
+        compared: Says how far the forms differ; called when they are in the folder.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     specs = layer_specs(len(weights.features), weights.hidden)
     arrays = [array for layer in weights.layers for array in layer]
@@ -109,7 +125,7 @@ def export_bundle(
         metric=description.metric,
         k_min=description.k_min,
         files={name: file_spec(folder / name) for name in FILES},
-        parity=check(weights, folder, features, ctx),
+        parity=compared(),
         provenance=description.provenance,
         evaluation=description.evaluation,
     )

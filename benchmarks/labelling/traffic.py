@@ -38,13 +38,13 @@ def traffic(dump: FragmentDump, curves: Curves, hulls: Hulls, budgets: int) -> d
             "read": 2 * (curves.error.nbytes + index) + vertex + 2 * index,
             "written": vertex + 2 * index + 2 * vertex,
         },
-        # Keys and lengths of all steps; two histograms; then one walk along the hulls for each budget.
+        # Keys and lengths of all steps, threads' shares; two histograms; then one walk along the hulls for each budget.
         "five budgets": {
-            "read": (2 * vertex + index)
+            "read": (2 * vertex + 3 * index)
             + vertex
             + (2 * vertex + index)
             + 2 * vertex
-            + budgets * (3 * vertex + 4 * index),
-            "written": 3 * vertex + budgets * (index + index // 2 + 2 * dump.pixels),
+            + budgets * (3 * vertex + 2 * index),
+            "written": 3 * vertex + index + budgets * (index // 2 + 2 * dump.pixels),
         },
     }

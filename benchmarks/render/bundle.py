@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import pairwise
 from pathlib import Path
 
 import moderngl
@@ -15,6 +13,7 @@ import numpy as np
 from renderer.context import describe
 from renderer.features import FEATURES
 from schemas.bundle import Provenance, TailSpec
+from services.stress.predictors import random_layers
 from trainer.bundle import Description, export_bundle
 from trainer.weights import Weights
 
@@ -26,17 +25,9 @@ HIDDEN = (32, 16)
 def random_bundle(ctx: moderngl.Context) -> Iterator[Path]:
     """A bundle of the usual shape with random weights: as fast as a trained one, but its pictures mean nothing."""
     rng = np.random.default_rng(3)
-    sizes = (len(FEATURES), *HIDDEN, 2)
-    layers = [
-        (
-            rng.normal(0.0, 1.5 / math.sqrt(fan_in), (fan_out, fan_in)).astype(np.float32),
-            rng.normal(0.0, 0.3, fan_out).astype(np.float32),
-        )
-        for fan_in, fan_out in pairwise(sizes)
-    ]
-    layers[-1][1][0] = -8.0
+    layers = random_layers(rng, HIDDEN)
     mean, std = np.zeros(len(FEATURES), dtype=np.float32), np.ones(len(FEATURES), dtype=np.float32)
-    weights = Weights(FEATURES, mean, std, tuple(layers))
+    weights = Weights(FEATURES, mean, std, layers)
     description = Description(
         name="random",
         tail=TailSpec(name="density", g=0.75),

@@ -57,7 +57,7 @@ class Suite:
         found: dict[bool, list[Row]] = {False: [], True: []}
         with tempfile.TemporaryDirectory() as folder:
             weights = next(iter(self._networks.values()))
-            bundle = gl_network.write_bundle(Path(folder), weights, describe(self._ctx))
+            bundle = gl_network.random_bundle(Path(folder), weights, describe(self._ctx))
             for scenery in sceneries(self._options):
                 found[scenery.deep] += self._scenery(scenery, weights, bundle)
         yield from worst_rows(found[False])

@@ -10,32 +10,18 @@ from pathlib import Path
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
-from safetensors.numpy import save
 
 from renderer.features import FEATURES, SUMS
 from renderer.frame import Frame, Gathered
 from renderer.techniques import KBufferDeep
-from schemas.bundle import (
-    FILES,
-    GLSL,
-    MANIFEST,
-    ONNX,
-    WEIGHTS,
-    FeatureSpec,
-    Manifest,
-    ParityReport,
-    Provenance,
-    TailSpec,
-    file_spec,
-    layer_specs,
-)
+from schemas.bundle import GLSL, ParityReport, Provenance, TailSpec
 from services.stress.findings import Finding, Options, compared
 from services.stress.gl_bounds import bound_of
 from services.stress.gl_cases import Case, thinned
 from services.stress.predictors import Rows, feature_cases, predicted64
 from services.stress.twins import features64, network64, sums64
+from trainer.bundle import Description, write_bundle
 from trainer.export_glsl import glsl_source
-from trainer.export_onnx import onnx_model
 from trainer.glsl_network import glsl_outputs
 from trainer.weights import Weights
 
@@ -44,31 +30,18 @@ _SPREADS = [i for i, name in enumerate(FEATURES) if "_std" in name]
 _OTHERS = [i for i in range(len(FEATURES)) if i not in _SPREADS]
 
 
-def write_bundle(folder: Path, weights: Weights, driver: str) -> Path:
+def random_bundle(folder: Path, weights: Weights, driver: str) -> Path:
     """A bundle of a network. Its forms are not compared here: that is what the suites do."""
-    specs = layer_specs(len(weights.features), weights.hidden)
-    arrays = [array for layer in weights.layers for array in layer]
-    tensors = {spec.name: np.ascontiguousarray(array) for spec, array in zip(specs, arrays, strict=True)}
-    (folder / WEIGHTS).write_bytes(save(tensors, metadata={"head": "gain-curve"}))
-    (folder / ONNX).write_bytes(onnx_model(weights))
-    (folder / GLSL).write_text(glsl_source(weights), encoding="utf-8")
-    manifest = Manifest(
+    description = Description(
         name="stress",
-        features=tuple(
-            FeatureSpec(name=name, mean=float(mean), std=float(std))
-            for name, mean, std in zip(weights.features, weights.mean, weights.std, strict=True)
-        ),
-        hidden=weights.hidden,
-        layers=specs,
         tail=TailSpec(name="density", g=0.75),
         metric="display",
         k_min=1,
-        files={name: file_spec(folder / name) for name in FILES},
-        parity=ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver=driver),
         provenance=Provenance(scenes={}, code_version="0", seed=0, machine="stress"),
         evaluation={},
     )
-    (folder / MANIFEST).write_text(manifest.model_dump_json(), encoding="utf-8")
+    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver=driver)
+    write_bundle(folder, weights, description, lambda: parity)
     return folder
 
 

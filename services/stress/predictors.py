@@ -106,19 +106,30 @@ def networks(seed: int, real: Rows) -> dict[str, Weights]:
     made = {}
     for name, hidden, least in (("32-16", (32, 16), 1e-2), ("64-64-64, features of spread 1e-4", (64, 64, 64), 1e-4)):
         rng = np.random.default_rng(seed)
-        sizes = (len(FEATURES), *hidden, 2)
-        layers = [
-            (
-                rng.normal(0.0, 1.5 / math.sqrt(fan_in), (fan_out, fan_in)).astype(np.float32),
-                rng.normal(0.0, 0.3, fan_out).astype(np.float32),
-            )
-            for fan_in, fan_out in pairwise(sizes)
-        ]
-        layers[-1][1][0] = -8.0
+        layers = random_layers(rng, hidden)
         std = real.std(axis=0) if least == 1e-2 else np.full(len(FEATURES), least)
         std = np.maximum(std, least).astype(np.float32)
-        made[name] = Weights(FEATURES, real.mean(axis=0).astype(np.float32), std, tuple(layers))
+        made[name] = Weights(FEATURES, real.mean(axis=0).astype(np.float32), std, layers)
     return made
+
+
+def random_layers(rng: np.random.Generator, hidden: tuple[int, ...]) -> tuple[tuple[Rows, Rows], ...]:
+    """Weights and biases of the size that training gives, float32.
+
+    Args:
+        rng: Draws them.
+        hidden: Units of the hidden layers.
+    """
+    sizes = (len(FEATURES), *hidden, 2)
+    layers = [
+        (
+            rng.normal(0.0, 1.5 / math.sqrt(fan_in), (fan_out, fan_in)).astype(np.float32),
+            rng.normal(0.0, 0.3, fan_out).astype(np.float32),
+        )
+        for fan_in, fan_out in pairwise(sizes)
+    ]
+    layers[-1][1][0] = -8.0
+    return tuple(layers)
 
 
 def feature_cases(rng: np.random.Generator, weights: Weights, real: Rows) -> dict[str, Rows]:

@@ -55,7 +55,7 @@ def test_a_sound_renderer_is_within_its_bounds(
 ) -> None:
     case = make_case(gl, CASES[name], shared)
     weights = next(iter(networks(0, real_features(np.random.default_rng(0), 50)).values()))
-    bundle = gl_network.write_bundle(tmp_path, weights, "here")
+    bundle = gl_network.random_bundle(tmp_path, weights, "here")
     rows = [
         *gl_capture.rows(case, "here"),
         *gl_network.rows(case, weights, bundle, "here"),

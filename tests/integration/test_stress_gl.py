@@ -9,6 +9,7 @@ from renderer.techniques import TECHNIQUES
 from schemas.tail import TAILS
 from services.stress import gl
 from services.stress.findings import Finding, NotRun, Options, Row
+from services.stress.gl_drivers import ZINK
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +38,7 @@ def test_a_driver_that_is_not_there_is_said(rows: list[Row]) -> None:
 
 def test_both_drivers_capture_the_same_bits(rows: list[Row]) -> None:
     if not lavapipe_installed():
-        pytest.skip("there is no Vulkan driver for zink")
+        pytest.skip(f"there is no Vulkan driver for zink: apt-get install {ZINK.packages}")
     (agreed,) = (row for row in rows if row.path == "capture · llvmpipe = zink")
     assert isinstance(agreed, Finding)
     assert agreed.ok
