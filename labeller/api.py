@@ -16,7 +16,7 @@ from labeller.rules import allocate_curves
 from renderer.allocation.importance import VkbOptions
 from schemas.fragments import FragmentDump
 from schemas.problem import ExitCode, Problem
-from schemas.tail import DENSITY_G, METRICS, TAILS, MetricName, TailName
+from schemas.tail import DEFAULT_TAIL, DENSITY_G, METRICS, TAILS, MetricName, TailName
 
 _VKB: Final = VkbOptions()
 _REQUIRED: Final = ("rgba", "depth")
@@ -28,7 +28,7 @@ def allocate(
     budgets: Iterable[int] | int,
     rule: RuleName = "optimal",
     *,
-    tail: TailName = "density",
+    tail: TailName = DEFAULT_TAIL,
     g: float = DENSITY_G,
     metric: MetricName = "display",
     k_min: int = 1,

@@ -7,6 +7,7 @@ from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict
 
+from renderer.depth_bins import MOST_BINS
 from renderer.features import FEATURES
 
 CountType = Literal["uint16", "uint32"]
@@ -57,6 +58,10 @@ FEATURE_MEANINGS: Final[Mapping[str, str]] = {
     "depth_mean": "mean relative depth (z - z_min) / (z_max - z_min), 0..1",
     "depth_std": "standard deviation of the relative depth, 0..1",
     "depth_extent": "log(1e-4 + (z_max - z_min) / z_max)",
+    **{
+        f"front_{j}": f"share of D in front of depth bin {j} of 16, 0..1; 0 where the tail has no such bin"
+        for j in range(1, MOST_BINS)
+    },
 }
 """What `renderer.features.FEATURES` hold, in their order."""
 

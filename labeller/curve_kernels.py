@@ -15,6 +15,7 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from labeller.numerics import add_squared, display_of, tail_weights
+from renderer.depth_bins import binned_exponents
 from schemas.tail import MAX_EXPONENT
 
 DENSITY: Final = 0
@@ -36,9 +37,10 @@ class Lists(NamedTuple):
 
 
 class Look(NamedTuple):
-    """How lists become colours: tail, metric, and tables of the 256 stored values."""
+    """How lists become colours: tail and its depth bins (0: none), metric, and tables of the 256 stored values."""
 
     tail: int
+    bins: int
     space: int
     decode: NDArray[np.float64]
     level: NDArray[np.float64]
@@ -51,7 +53,7 @@ class _Block(NamedTuple):
     Attributes:
         alpha: Of fragment m.
         red: Of fragment m, decoded; so are `green` and `blue`.
-        exponent: D times the relative depth of fragment m.
+        exponent: D times the relative depth of fragment m, or what its depth bins say is in front of it.
         base_red: Core plus background behind the tail; so are the others.
         exact_red: The pixel's exact colour, encoded; so are the others.
         share: What the mean colour of the tail is multiplied with.
@@ -112,7 +114,7 @@ def errors_of(
         for p in range(first, end):
             longest = max(longest, offsets[p + 1] - offsets[p])
         room = max(_BLOCK, longest)
-        block, counts = _block(room), np.empty(room, dtype=np.int64)
+        block, counts, front = _block(room), np.empty(room, dtype=np.int64), np.empty(look.bins + 1)
         while first < end:
             last, used = first, 0
             while last < end and last - first < room:
@@ -123,7 +125,7 @@ def errors_of(
                 counts[last - first] = entries
                 used += entries
                 last += 1
-            _gather(lists, look, first, counts[: last - first], block)
+            _gather(lists, look, first, counts[: last - first], front, block)
             for j in range(len(gs)):
                 _mix(look, gs[j], counts[: last - first], used, block)
                 _store(offsets, first, counts[: last - first], weights, block.squared, error[j])
@@ -131,7 +133,9 @@ def errors_of(
 
 
 @njit(cache=True, error_model="numpy")
-def _gather(lists: Lists, look: Look, first: int, counts: NDArray[np.int64], block: _Block) -> None:
+def _gather(
+    lists: Lists, look: Look, first: int, counts: NDArray[np.int64], front: NDArray[np.float64], block: _Block
+) -> None:
     """Everything of the pixels' entries that does not depend on g."""
     at = 0
     for j in range(len(counts)):
@@ -140,10 +144,15 @@ def _gather(lists: Lists, look: Look, first: int, counts: NDArray[np.int64], blo
             continue
         p = first + j
         begin = lists.offsets[p]
-        near = np.float64(lists.depth[begin])
+        rgba, depth = lists.rgba[begin : begin + n], lists.depth[begin : begin + n]
+        optical = _core(look, rgba, lists.background[p], at, block)
+        if look.bins:
+            binned_exponents(depth, rgba, optical, front, block.exponent[at : at + n])
+            at += n
+            continue
+        near = np.float64(depth[0])
         for i in range(n):
-            block.exponent[np.uint64(at + i)] = np.float64(lists.depth[np.uint64(begin + i)]) - near
-        optical = _core(look, lists.rgba[begin : begin + n], lists.background[p], at, block)
+            block.exponent[np.uint64(at + i)] = np.float64(depth[np.uint64(i)]) - near
         extent = block.exponent[at + n - 1]
         steepness = optical / extent if extent > 0.0 else 0.0
         for i in range(n):
@@ -209,9 +218,9 @@ def tail_factors(tail: int, count: int, alphas: float, through: float) -> tuple[
 def _mix(look: Look, g: float, counts: NDArray[np.int64], used: int, block: _Block) -> None:
     """Squared differences of all entries."""
     weight = block.alpha
-    if look.tail == DENSITY and g > 0.0:
+    if look.bins or (look.tail == DENSITY and g > 0.0):
         weight = block.weight
-        tail_weights(block.alpha[:used], block.exponent[:used], g, weight[:used])
+        tail_weights(block.alpha[:used], block.exponent[:used], 1.0 if look.bins else g, weight[:used])
     at = 0
     for n in counts:
         red, green, blue, total = 0.0, 0.0, 0.0, 0.0
@@ -274,7 +283,8 @@ def colours_of(lists: Lists, look: Look, g: float, kept: NDArray[np.int32], out:
     """
     offsets, decode, level = lists.offsets, look.decode, look.level
     for chunk in prange(len(lists.chunks) - 1):
-        core, sums = np.empty(3), np.empty(3)
+        core, sums, front = np.empty(3), np.empty(3), np.empty(look.bins + 1)
+        exponents = np.empty(0)
         for p in range(lists.chunks[chunk], lists.chunks[chunk + 1]):
             n, k = offsets[p + 1] - offsets[p], kept[p]
             rgba, depth = lists.rgba[offsets[p] : offsets[p + 1]], lists.depth[offsets[p] : offsets[p + 1]]
@@ -284,11 +294,13 @@ def colours_of(lists: Lists, look: Look, g: float, kept: NDArray[np.int32], out:
                     core[c] += t * level[rgba[i, 3]] * decode[rgba[i, c]]
                 t *= 1.0 - level[rgba[i, 3]]
             sums[:], alphas, total, through = 0.0, 0.0, 0.0, 1.0
-            steepness = _steepness(look, g, rgba, depth) if k < n else 0.0
+            if len(exponents) < n:
+                exponents = np.empty(2 * n)
+            if k < n:
+                _exponents(look, g, rgba, depth, front, exponents[:n])
             for i in range(n - 1, k - 1, -1):
                 alpha = level[rgba[i, 3]]
-                exponent = steepness * (np.float64(depth[i]) - np.float64(depth[0]))
-                w = alpha * math.exp(-min(exponent, MAX_EXPONENT))
+                w = alpha * math.exp(-min(exponents[i], MAX_EXPONENT))
                 alphas += alpha
                 total += w
                 through *= 1.0 - alpha
@@ -301,12 +313,22 @@ def colours_of(lists: Lists, look: Look, g: float, kept: NDArray[np.int32], out:
 
 
 @njit(inline="always")
-def _steepness(look: Look, g: float, rgba: NDArray[np.uint8], depth: NDArray[np.float32]) -> float:
-    """`g D / (z_max - z_min)` of a list: the density tail's exponent per metre behind z_min."""
-    extent = np.float64(depth[-1]) - np.float64(depth[0])
-    if look.tail != DENSITY or extent <= 0.0:
-        return 0.0
+def _exponents(
+    look: Look,
+    g: float,
+    rgba: NDArray[np.uint8],
+    depth: NDArray[np.float32],
+    front: NDArray[np.float64],
+    out: NDArray[np.float64],
+) -> None:
+    """What `exp(-.)` of is a fragment's weight in the tail, float64 [n]."""
     total = 0.0
     for i in range(len(rgba)):
         total += look.optical[rgba[i, 3]]
-    return g * total / extent
+    if look.bins:
+        binned_exponents(depth, rgba, total, front, out)
+        return
+    extent = np.float64(depth[-1]) - np.float64(depth[0])
+    steepness = g * total / extent if look.tail == DENSITY and extent > 0.0 else 0.0
+    for i in range(len(out)):
+        out[i] = steepness * (np.float64(depth[i]) - np.float64(depth[0]))

@@ -14,15 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labeller.curve_kernels import Lists, Look, colours_of, errors_of
+from renderer.depth_bins import OPTICAL
 from schemas.colour import decode_gamma2
 from schemas.fragments import FragmentDump
 from schemas.problem import ExitCode, Problem
-from schemas.tail import DENSITY_G, METRICS, TAILS, MetricName, TailName
+from schemas.tail import DEFAULT_TAIL, DENSITY_BINS, DENSITY_G, METRICS, TAILS, MetricName, TailName
 
 _CHUNKS: Final = 256  # more than threads, of equal numbers of fragments: crowded regions are shared out
 _LEVELS: Final = np.arange(256, dtype=np.float64) / 255.0
-# Alpha 1 never is in a dump (schemas.fragments); should it be, the depth of the pixel stays finite.
-_OPTICAL: Final = -np.log(np.maximum(1.0 - _LEVELS, 1e-3))
 _NOTHING: Final = np.empty(0, dtype=np.float64)
 
 
@@ -60,7 +59,7 @@ class Curves:
 
 def error_curves(
     dump: FragmentDump,
-    tail: TailName = "density",
+    tail: TailName = DEFAULT_TAIL,
     g: float = DENSITY_G,
     metric: MetricName = "display",
     weights: NDArray[np.floating] | None = None,
@@ -160,7 +159,7 @@ def _checked_weights(weights: NDArray[np.floating] | None, pixels: int) -> NDArr
 
 
 def composite(
-    dump: FragmentDump, k: NDArray[np.integer], tail: TailName = "density", g: float = DENSITY_G
+    dump: FragmentDump, k: NDArray[np.integer], tail: TailName = DEFAULT_TAIL, g: float = DENSITY_G
 ) -> NDArray[np.float32]:
     """The picture that an allocation gives.
 
@@ -220,4 +219,4 @@ def _lists(dump: FragmentDump) -> Lists:
 
 def _look(tail: TailName, metric: MetricName) -> Look:
     decode = _LEVELS if metric == "paper" else decode_gamma2(np.arange(256, dtype=np.uint8))
-    return Look(TAILS.index(tail), METRICS.index(metric), decode, _LEVELS, _OPTICAL)
+    return Look(TAILS.index(tail), DENSITY_BINS.get(tail, 0), METRICS.index(metric), decode, _LEVELS, OPTICAL)

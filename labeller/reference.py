@@ -13,7 +13,18 @@ from numpy.typing import NDArray
 
 from schemas.colour import decode_gamma2, linear_to_srgb
 from schemas.fragments import FragmentDump
-from schemas.tail import DENSITY_G, MAX_EXPONENT, MetricName, TailName
+from schemas.tail import (
+    BIN_LIMIT,
+    DEFAULT_TAIL,
+    DENSITY_BINS,
+    DENSITY_G,
+    MAX_EXPONENT,
+    OPTICAL_UNIT,
+    ROOT_SHARE,
+    SHARE_LEVELS,
+    MetricName,
+    TailName,
+)
 
 Colour = NDArray[np.float64]
 
@@ -54,17 +65,45 @@ def pixel_of(dump: FragmentDump, p: int, stored: bool = False) -> Pixel:
 
 def tail_weights(pixel: Pixel, tail: TailName, g: float = DENSITY_G) -> NDArray[np.float64]:
     """float64 [n], the weights with which colours enter the tail's mean; they do not depend on k."""
-    if tail != "density" or pixel.n == 0:
+    if pixel.n == 0 or tail not in ("density", *DENSITY_BINS):
         return pixel.alpha.copy()
-    z_min, z_max = pixel.depth[0], pixel.depth[-1]
-    if z_max == z_min:
-        return pixel.alpha.copy()
-    optical_depth = sum(-math.log(max(1.0 - a, 1e-3)) for a in pixel.alpha)
-    exponent = g * optical_depth * (pixel.depth - z_min) / (z_max - z_min)
+    optical = -np.log(np.maximum(1.0 - pixel.alpha, 1e-3))
+    if tail in DENSITY_BINS:
+        exponent = binned_exponents(pixel.depth, optical, DENSITY_BINS[tail])
+    else:
+        extent = pixel.depth[-1] - pixel.depth[0]
+        relative = (pixel.depth - pixel.depth[0]) / (extent if extent > 0.0 else 1.0)
+        exponent = g * optical.sum() * relative
     return np.asarray(pixel.alpha * np.exp(-np.minimum(exponent, MAX_EXPONENT)), dtype=np.float64)
 
 
-def composite(pixel: Pixel, k: int, tail: TailName = "density", g: float = DENSITY_G) -> Colour:
+def binned_exponents(depth: NDArray[np.float64], optical: NDArray[np.float64], bins: int) -> NDArray[np.float64]:
+    """Optical depth that lies in front of each fragment, as far as depth bins know it (METHOD section 2).
+
+    Args:
+        depth: float64 [n], float32 values, ascending, n > 0.
+        optical: float64 [n], `-ln(1 - a)`.
+        bins: B.
+
+    Returns:
+        float64 [n]. Bins are found in float32, as shaders do, so that both agree on the bin of every fragment, and
+        count in whole units.
+    """
+    z = depth.astype(np.float32)
+    extent = z[-1] - z[0]
+    x = (z - z[0]) / extent if extent > 0.0 else np.zeros_like(z)
+    y = (np.float32(1.0 - ROOT_SHARE) * x + np.float32(ROOT_SHARE) * np.sqrt(x)) * np.float32(bins)
+    place = np.minimum(y.astype(np.int32), bins - 1)
+    units = [max(1, round(float(d) * OPTICAL_UNIT)) if d > 0.0 else 0 for d in optical]
+    counts = [min(sum(u for u, b in zip(units, place, strict=True) if b == bin_), BIN_LIMIT) for bin_ in range(bins)]
+    front = [sum(counts[:b]) for b in range(bins + 1)]
+    steps = [(2 * SHARE_LEVELS * f + front[-1]) // (2 * front[-1]) if front[-1] else 0 for f in front]
+    kept = np.array(steps) / SHARE_LEVELS * optical.sum()
+    others = np.maximum(kept[place + 1] - kept[place] - optical, 0.0)
+    return np.asarray(kept[place] + others * (y - place))
+
+
+def composite(pixel: Pixel, k: int, tail: TailName = DEFAULT_TAIL, g: float = DENSITY_G) -> Colour:
     """Colour of a pixel with k core fragments, float64 [3], in the space of `pixel.colour`."""
     transmittance, core = 1.0, np.zeros(3)
     for i in range(k):
@@ -75,7 +114,7 @@ def composite(pixel: Pixel, k: int, tail: TailName = "density", g: float = DENSI
     if len(alpha) == 0 or weight.sum() == 0.0:
         return np.asarray(core + transmittance * pixel.background)
     mean = (weight[:, None] * pixel.colour[behind]).sum(axis=0) / weight.sum()
-    if tail in ("density", "exact-coverage"):
+    if tail in ("density", "exact-coverage", *DENSITY_BINS):
         through = float(np.prod(1.0 - alpha))
     else:
         through = float(max(1.0 - alpha.sum() / len(alpha), 0.0) ** len(alpha))
@@ -89,7 +128,7 @@ def exact(pixel: Pixel) -> Colour:
 
 
 def curve(
-    dump: FragmentDump, p: int, tail: TailName = "density", g: float = DENSITY_G, metric: MetricName = "display"
+    dump: FragmentDump, p: int, tail: TailName = DEFAULT_TAIL, g: float = DENSITY_G, metric: MetricName = "display"
 ) -> NDArray[np.float64]:
     """float64 [n+1], e_p(k): squared difference from the exact colour, summed over RGB."""
     pixel = pixel_of(dump, p, stored=metric == "paper")

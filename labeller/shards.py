@@ -27,7 +27,7 @@ from labeller.skips import needed_budgets
 from renderer.features import derive, gather
 from schemas.fragments import FragmentDump
 from schemas.problem import ExitCode, Problem
-from schemas.tail import MetricName, TailName
+from schemas.tail import DENSITY_BINS, MetricName, TailName
 
 SHARES: Final = (0.05, 0.1, 0.25, 0.4, 0.6, 0.8, 0.9)
 """Budgets, as shares of the view's fragments, at which every shard knows the price."""
@@ -98,7 +98,7 @@ class Shard:
     """Sampled pixels of one view.
 
     Attributes:
-        features: float32 [R, 26], columns `renderer.features.FEATURES`.
+        features: float32 [R, 41], columns `renderer.features.FEATURES`.
         n: int32 [R], fragments.
         pixel: int32 [R], pixel index in the view, ascending.
         hull_offsets: int64 [R+1], hull vertices of row r are `hull_offsets[r]:hull_offsets[r+1]`.
@@ -183,7 +183,9 @@ def write_shard(
         sampling=sampling,
         levels=_levels(dump, curves, hulls, budgets),
     )
-    columns = _columns(dump, hulls, sample_pixels(eligible, dump.counts[eligible], sampling))
+    columns = _columns(
+        dump, DENSITY_BINS.get(curves.tail, 0), hulls, sample_pixels(eligible, dump.counts[eligible], sampling)
+    )
     return write_columns(path, columns, meta.model_dump(mode="json"))
 
 
@@ -289,7 +291,7 @@ def _check_values(shard: Shard) -> None:
         raise Damage(f"it has {', '.join(wrong)}")
 
 
-def _columns(dump: FragmentDump, hulls: Hulls, pixel: NDArray[np.int64]) -> Columns:
+def _columns(dump: FragmentDump, bins: int, hulls: Hulls, pixel: NDArray[np.int64]) -> Columns:
     """What the file holds of the rows: of each hull segment its length, and the error at its start."""
     vertices = np.diff(hulls.offsets)[pixel]
     segments = np.maximum(vertices - 1, 0)
@@ -299,7 +301,7 @@ def _columns(dump: FragmentDump, hulls: Hulls, pixel: NDArray[np.int64]) -> Colu
     n = dump.counts[pixel]
     count = np.uint16 if n.max(initial=0) < 1 << 16 else np.uint32
     return {
-        "features": derive(gather(dump)[pixel]),
+        "features": derive(gather(dump, bins)[pixel]),
         "n": n.astype(count),
         "pixel": pixel.astype(np.uint32),
         "hull_segments": segments.astype(count),

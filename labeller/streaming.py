@@ -22,7 +22,7 @@ from labeller.hull import lower_hulls
 from labeller.rules import each_budget
 from schemas.fragments import FragmentDump
 from schemas.problem import ExitCode, Problem
-from schemas.tail import DENSITY_G, MetricName, TailName
+from schemas.tail import DEFAULT_TAIL, DENSITY_G, MetricName, TailName
 
 
 def allocate_bands(
@@ -30,7 +30,7 @@ def allocate_bands(
     budgets: Iterable[int] | int,
     rule: ErrorRule = "optimal",
     *,
-    tail: TailName = "density",
+    tail: TailName = DEFAULT_TAIL,
     g: float = DENSITY_G,
     metric: MetricName = "display",
     k_min: int = 1,

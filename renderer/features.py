@@ -1,12 +1,14 @@
 """Order-independent per-pixel features: the raw sums of one additive pass, and what a predictor reads.
 
-`gather` makes the sums from a fragment dump; the GL pass that fills the same 7 texels per pixel is its twin.
+`gather` makes the sums from a fragment dump; the GL passes that fill the same texels per pixel are its twin.
 `derive` turns sums into features. `FEATURES_GLSL` is the one source of the GLSL form of every feature:
 `features_glsl` writes `shaders/common/features.glsl` (all of them) and the part of a bundle's `predict.glsl`
 (those that its model reads).
 
 Colours are the stored gamma-2 values / 255, alphas the stored values / 255, `x` is the relative depth
-`(z - z_min) / (z_max - z_min)`, 0 where `z_max = z_min`.
+`(z - z_min) / (z_max - z_min)`, 0 where `z_max = z_min`. `front_j` is the share of the optical depth in front of the
+j-th of 16 depth bins, as the binned density tails keep it (`renderer.depth_bins`): with 8 bins only the even ones are
+there, with other tails none is.
 """
 
 from __future__ import annotations
@@ -19,10 +21,11 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.depth_bins import MOST_BINS, OPTICAL, kept_share, units_in_front
 from schemas.fragments import FragmentDump
 from schemas.problem import Problem
 
-TEXELS: Final = 7
+TEXELS: Final = 11
 SUMS: Final[tuple[str, ...]] = (
     *("n", "sum_a", "sum_a2", "optical_depth"),
     *("sum_r", "sum_g", "sum_b", "sum_x"),
@@ -31,8 +34,14 @@ SUMS: Final[tuple[str, ...]] = (
     *("sum_r_x", "sum_g_x", "sum_b_x", "z_max"),
     *("nearest_r", "nearest_g", "nearest_b", "nearest_a"),
     *("background_r", "background_g", "background_b", "unused"),
+    *(f"front_{j}" for j in range(1, MOST_BINS)),
+    "unused_too",
 )
-"""Columns of the raw sums: 7 RGBA32F texels, in this order. Depths in metres."""
+"""Columns of the raw sums: RGBA32F texels, in this order. Depths in metres."""
+
+_FRONT: Final = SUMS.index("front_1")
+BINNED: Final = _FRONT // 4
+"""The first texel that the depth bins fill."""
 
 
 def _channels(name: str, expression: str) -> dict[str, str]:
@@ -55,21 +64,24 @@ FEATURES_GLSL: Final[dict[str, str]] = {
     "depth_mean": "s[1].w * inv_n",
     "depth_std": "sqrt(max(0.0, s[2].w * inv_n - (s[1].w * inv_n) * (s[1].w * inv_n)))",
     "depth_extent": "log(1e-4 + (s[4].w - s[3].w) / s[4].w)",
+    **{f"front_{j + 1}": f"s[{7 + j // 4}].{'xyzw'[j % 4]}" for j in range(MOST_BINS - 1)},
 }
-"""Feature name -> GLSL expression of the sums `vec4 s[7]` and `float inv_n = 1 / n`, for n > 0."""
+"""Feature name -> GLSL expression of the sums `vec4 s[11]` and `float inv_n = 1 / n`, for n > 0."""
 
 FEATURES: Final[tuple[str, ...]] = tuple(FEATURES_GLSL)
 """Columns of the derived features, in this order. A bundle's manifest lists those its model reads."""
 
 
-def texels_of(names: Sequence[str]) -> frozenset[int]:
-    """The texels of `SUMS` that features read: what a gather pass has to leave for them.
+def texels_of(names: Sequence[str], binned: bool = False) -> frozenset[int]:
+    """The texels of `SUMS` that features read and a gather pass has to leave for them.
 
     Args:
         names: Members of `FEATURES`.
+        binned: Whether the tail's depth bins are gathered, which know the optical depth as well.
     """
-    read = {(int(texel), c) for name in names for texel, c in re.findall(r"s\[(\d)\]\.(\w)", FEATURES_GLSL[name])}
-    return frozenset(texel for texel, _ in read - {(3, "w"), (4, "w")})  # the depth range is the count pass's
+    read = {(int(texel), c) for name in names for texel, c in re.findall(r"s\[(\d+)\]\.(\w)", FEATURES_GLSL[name])}
+    elsewhere = {(0, "x"), (3, "w"), (4, "w")} | ({(0, "w")} if binned else set())  # the count pass has n and depths
+    return frozenset(texel for texel, _ in read - elsewhere if texel < BINNED)
 
 
 def features_glsl(names: Sequence[str] = FEATURES) -> str:
@@ -102,14 +114,15 @@ def features_glsl(names: Sequence[str] = FEATURES) -> str:
     )
 
 
-def gather(dump: FragmentDump) -> NDArray[np.float32]:
+def gather(dump: FragmentDump, bins: int = 0) -> NDArray[np.float32]:
     """Raw sums of every pixel.
 
     Args:
         dump: Fragments of a view, front to back in each pixel.
+        bins: Depth bins of the tail (`schemas.tail.DENSITY_BINS`); 0: it has none.
 
     Returns:
-        float32 [P, 28], columns `SUMS`; accumulated in float64. Rows of pixels without fragments are zero.
+        float32 [P, 44], columns `SUMS`; accumulated in float64. Rows of pixels without fragments are zero.
 
     Raises:
         Problem: A depth is not finite.
@@ -121,6 +134,8 @@ def gather(dump: FragmentDump) -> NDArray[np.float32]:
         )
     sums = np.zeros((dump.pixels, len(SUMS)), dtype=np.float32)
     _gather(dump.offsets, dump.rgba, dump.depth, dump.background, sums)
+    if bins:
+        _gather_bins(dump.offsets, dump.rgba, dump.depth, bins, sums)
     return sums
 
 
@@ -128,10 +143,10 @@ def derive(sums: NDArray[np.float32]) -> NDArray[np.float32]:
     """Features from raw sums, in float32 arithmetic as in a shader.
 
     Args:
-        sums: float32 [P, 28], columns `SUMS`.
+        sums: float32 [P, 44], columns `SUMS`.
 
     Returns:
-        float32 [P, 26], columns `FEATURES`; zero where n = 0.
+        float32 [P, 41], columns `FEATURES`; zero where n = 0.
     """
     features = np.zeros((len(sums), len(FEATURES)), dtype=np.float32)
     _derive(np.ascontiguousarray(sums, dtype=np.float32), features)
@@ -146,7 +161,6 @@ def _gather(
     background: NDArray[np.uint8],
     sums: NDArray[np.float32],
 ) -> None:
-    optical = -np.log(np.maximum(1.0 - np.arange(256) / 255.0, 1e-3))  # 255 is never in a dump; kept finite
     for p in numba.prange(len(offsets) - 1):
         first, last = offsets[p], offsets[p + 1]
         if first == last:
@@ -160,7 +174,7 @@ def _gather(
             x = (np.float64(depth[i]) - z_min) * scale
             acc[1] += a
             acc[2] += a * a
-            acc[3] += optical[rgba[i, 3]]
+            acc[3] += OPTICAL[rgba[i, 3]]
             acc[7] += x
             acc[11] += x * x
             for c in range(3):
@@ -178,6 +192,25 @@ def _gather(
             sums[p, 20 + c] = rgba[first, c] / 255.0
         for c in range(3):
             sums[p, 24 + c] = background[p, c] / 255.0
+
+
+@numba.njit(parallel=True, cache=True)
+def _gather_bins(
+    offsets: NDArray[np.int64],
+    rgba: NDArray[np.uint8],
+    depth: NDArray[np.float32],
+    bins: int,
+    sums: NDArray[np.float32],
+) -> None:
+    every = MOST_BINS // bins
+    for p in numba.prange(len(offsets) - 1):
+        first, last = offsets[p], offsets[p + 1]
+        if first == last:
+            continue
+        front = np.empty(bins + 1)
+        units_in_front(depth[first:last], rgba[first:last], front)
+        for b in range(1, bins):
+            sums[p, _FRONT - 1 + every * b] = kept_share(front[b], front[bins])
 
 
 @numba.njit(parallel=True, cache=True)
@@ -206,3 +239,5 @@ def _derive(sums: NDArray[np.float32], out: NDArray[np.float32]) -> None:
         x[23] = mean_x
         x[24] = np.sqrt(max(zero, s[11] * inv_n - mean_x * mean_x))
         x[25] = np.log(np.float32(1e-4) + (s[19] - s[15]) / s[19])
+        for j in range(MOST_BINS - 1):
+            x[26 + j] = s[_FRONT + j]

@@ -12,11 +12,13 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.gpu_scene import OPAQUE, TRANSPARENT, GpuScene
+from renderer import timing
+from renderer.gpu_scene import OPAQUE, TRANSPARENT, GpuScene, set_uniforms
 from renderer.programs import Defines
 from schemas.colour import encode_gamma2
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
+from schemas.tail import BIN_LIMIT, OPTICAL_UNIT, ROOT_SHARE, SHARE_LEVELS
 from schemas.view import View
 
 RGB = tuple[float, float, float]
@@ -26,6 +28,13 @@ Gather = Literal["gather-tail", "gather-nearest", "gather"]
 
 NEAREST = 5
 """The texel of `renderer.features.SUMS` that is the nearest fragment; those before it are sums by blending."""
+TARGETS = 8
+"""Colour attachments that every GL 4.5 driver has."""
+BIN_DEFINES: Defines = {
+    **{"ROOT_SHARE": ROOT_SHARE, "SHARE_LEVELS": SHARE_LEVELS},
+    **{"OPTICAL_UNIT": OPTICAL_UNIT, "BIN_LIMIT": BIN_LIMIT},
+}
+"""What `shaders/common/depth_bins.glsl` and its users need beside BINS."""
 ALL_TEXELS = frozenset(range(NEAREST + 1))
 _TEXELS: dict[Gather, frozenset[int]] = {
     "gather-tail": frozenset({0}),
@@ -43,26 +52,45 @@ class Gathered:
 
     Attributes:
         name: Of the pass.
-        sums: RGBA32F textures, five: `gather/gather.frag` says what each holds. Where one was not asked for, the first
-            stands in its place.
+        sums: RGBA32F textures, with bins RGBA16F, five: `gather/gather.frag` says what each holds. Where one was not
+            asked for, another stands in its place.
         nearest_colour: uint32 [P], packed colour of the nearest fragment, all ones where none; None if not gathered.
         nearest_facing: uint32 [P], its |n . e| * 255; None if not gathered.
+        bins: Depth bins of `front`; 0: none.
+        front: uint32 [P, 1 + bins / 8], the optical depth and its shares in front of the bins, as
+            `shaders/common/depth_bins.glsl` says; None without bins.
     """
 
     name: Gather
     sums: list[moderngl.Texture]
     nearest_colour: moderngl.Buffer | None = None
     nearest_facing: moderngl.Buffer | None = None
+    bins: int = 0
+    front: moderngl.Buffer | None = None
 
     @property
     def pixel_bytes(self) -> int:
         """Bytes a pixel of all this."""
-        return 16 * len({texture.glo for texture in self.sums}) + (8 if self.nearest_colour is not None else 0)
+        sums = sum({texture.glo: _SUM_BYTES.get(texture.dtype, 0) for texture in self.sums}.values())
+        return sums + (8 if self.nearest_colour is not None else 0) + front_bytes(self.bins)
+
+    @property
+    def pass_bytes(self) -> int:
+        """Bytes a pixel while it is gathered: until they are packed, bins have two bytes each, and D has four."""
+        return self.pixel_bytes + (2 * self.bins + 4 if self.bins else 0)
+
+
+_SUM_BYTES = {"f4": 16, "f2": 8}
+
+
+def front_bytes(bins: int) -> int:
+    """Bytes a pixel of packed depth bins."""
+    return 4 + bins // 2 if bins else 0
 
 
 @dataclass(slots=True)
 class Clock:
-    """Milliseconds of each pass: finished host clock, since timer queries read zero on software drivers."""
+    """Milliseconds of each pass on the finished host clock; `renderer.timing` has more where somebody listens."""
 
     ctx: moderngl.Context
     passes: dict[str, float] = field(default_factory=dict)
@@ -72,9 +100,12 @@ class Clock:
         """Time a block, the GPU's work included."""
         self.ctx.finish()
         start = time.perf_counter()
-        yield
+        with timing.gpu_pass(name):
+            yield
         self.ctx.finish()
-        self.passes[name] = self.passes.get(name, 0.0) + 1e3 * (time.perf_counter() - start)
+        taken = 1e3 * (time.perf_counter() - start)
+        self.passes[name] = self.passes.get(name, 0.0) + taken
+        timing.host_pass(name, taken)
 
 
 class Frame:
@@ -108,8 +139,9 @@ class Frame:
         self.depth = self.ctx.depth_renderbuffer((width, height))
         self._counts: moderngl.Buffer | None = None
         self._range: tuple[moderngl.Buffer, moderngl.Buffer] | None = None
-        self._gathered: dict[tuple[Gather, frozenset[int]], Gathered] = {}
+        self._gathered: dict[tuple[Gather, frozenset[int], int], Gathered] = {}
         self._count_array: NDArray[np.uint32] | None = None
+        self._spare: list[moderngl.Texture] = []
         with self.clock.measure("opaque"):
             self._draw_opaque(clear)
 
@@ -184,7 +216,12 @@ class Frame:
 
     def float_targets(self, *components: int) -> list[moderngl.Texture]:
         """Float32 textures of the frame's size, zero, one for each number of components."""
-        made = [self.ctx.texture((self.width, self.height), count, dtype="f4") for count in components]
+        made = [
+            self._spare.pop()
+            if count == 4 and self._spare
+            else self.ctx.texture((self.width, self.height), count, dtype="f4")
+            for count in components
+        ]
         for texture in made:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
             self.zero(texture)
@@ -220,47 +257,73 @@ class Frame:
     def count(self) -> NDArray[np.uint32]:
         """uint32 [P], n(p): the count pass, its result read back."""
         if self._count_array is None:
-            with self.clock.measure("count"):
-                buffer = self.depth_range()[0]
+            buffer = self.depth_range()[0]
+            with self.clock.measure("count"), timing.readback(self.ctx):
                 self._count_array = np.frombuffer(buffer.read(4 * self.pixels), dtype=np.uint32)
         return self._count_array
 
     @property
     def counted(self) -> bool:
-        """Whether n(p) is known already."""
-        return self._counts is not None
+        """Whether n(p) has been read back."""
+        return self._count_array is not None
 
     def depth_range(self) -> tuple[moderngl.Buffer, moderngl.Buffer, moderngl.Buffer]:
         """Buffers of n, z_min and z_max (float bits), uint32 [P] each, on the GPU."""
         if self._counts is None or self._range is None:
-            self._counts = self.buffer(self.pixels, 0)
-            self._range = self.buffer(self.pixels, 0xFFFFFFFF), self.buffer(self.pixels, 0)
-            for binding, buffer in ((COUNT, self._counts), (Z_MIN, self._range[0]), (Z_MAX, self._range[1])):
-                buffer.bind_to_storage_buffer(binding)
-            self.draw_transparent("count/count.frag", self.target([]), {"RANGE": 1})
-            self.ctx.memory_barrier()
+            with self.clock.measure("count"):
+                self._counts = self.buffer(self.pixels, 0)
+                self._range = self.buffer(self.pixels, 0xFFFFFFFF), self.buffer(self.pixels, 0)
+                for binding, buffer in ((COUNT, self._counts), (Z_MIN, self._range[0]), (Z_MAX, self._range[1])):
+                    buffer.bind_to_storage_buffer(binding)
+                self.draw_transparent("count/count.frag", self.target([]), {"RANGE": 1})
+                self.ctx.memory_barrier()
         return self._counts, *self._range
 
-    def gather(self, what: Gather, texels: frozenset[int] | None = None) -> Gathered:
+    def gather(self, what: Gather, texels: frozenset[int] | None = None, bins: int = 0) -> Gathered:
         """The order-independent sums of every pixel, by one additive pass.
 
         Args:
             what: Which pass.
             texels: Of a `gather`: which texels of `renderer.features.SUMS` are read; None: all. The first, and the
                 nearest fragment's facing if its colour is asked for, are always there.
+            bins: Depth bins that a tail needs (`schemas.tail.DENSITY_BINS`). With them the first texel is there only
+                if it is asked for: the count pass has n, and the bins have the optical depth.
         """
-        wanted = (_TEXELS[what] if texels is None else texels & _TEXELS[what]) | {0}
-        if (what, wanted) not in self._gathered:
+        wanted = _TEXELS[what] if texels is None else texels & _TEXELS[what]
+        if not bins:
+            wanted |= {0}
+        elif texels is None and what != "gather":
+            wanted -= {0}
+        if (what, wanted, bins) not in self._gathered:
             _, z_min, z_max = self.depth_range()
             self.clock.passes.pop(what, None)
             with self.clock.measure(what):
-                self._gathered[what, wanted] = self._gather(what, wanted, z_min, z_max)
-        return self._gathered[what, wanted]
+                self._gathered[what, wanted, bins] = self._gather(what, wanted, bins, z_min, z_max)
+        return self._gathered[what, wanted, bins]
 
-    def _gather(self, what: Gather, texels: frozenset[int], z_min: moderngl.Buffer, z_max: moderngl.Buffer) -> Gathered:
+    def retire(self, gathered: Gathered) -> Gathered:
+        """Give back what only a predictor reads of a gather pass: two of its textures become the next targets.
+
+        Returns:
+            What a tail reads: the packed bins, or the first texture. The pass runs again if somebody asks for all of
+            it again.
+        """
+        self._gathered = {key: kept for key, kept in self._gathered.items() if kept is not gathered}
+        first = gathered.sums[0] if gathered.front is None else self.background
+        others = {t.glo: t for t in gathered.sums if t.glo != first.glo and t.dtype == "f4"}
+        self._spare = [*self._spare, *others.values()][:2]
+        return Gathered(gathered.name, [first] * len(gathered.sums), bins=gathered.bins, front=gathered.front)
+
+    def _gather(
+        self, what: Gather, texels: frozenset[int], bins: int, z_min: moderngl.Buffer, z_max: moderngl.Buffer
+    ) -> Gathered:
         blended = sorted(texels - {NEAREST})
-        made = dict(zip(blended, self.float_targets(*[4] * len(blended)), strict=True))
-        gathered = Gathered(what, [made.get(texel, made[0]) for texel in range(NEAREST)])
+        # With bins no tail reads these sums, only a network, and half floats serve it as well (PREDICTORS.md).
+        targets = self._zero_targets(len(blended), "f2") if bins else self.float_targets(*[4] * len(blended))
+        made = dict(zip(blended, targets, strict=True))
+        # Where nothing is blended, a shader gets a texture that it does not read.
+        first = next(iter(made.values()), self.background)
+        gathered = Gathered(what, [made.get(texel, first) for texel in range(NEAREST)])
         z_min.bind_to_storage_buffer(Z_MIN)
         z_max.bind_to_storage_buffer(Z_MAX)
         if NEAREST in texels:
@@ -268,10 +331,41 @@ class Frame:
             gathered.nearest_facing = self.buffer(self.pixels, 0)
             gathered.nearest_colour.bind_to_storage_buffer(NEAREST_COLOUR)
             gathered.nearest_facing.bind_to_storage_buffer(NEAREST_FACING)
-        # Each sum that is there has the next colour attachment.
-        places = {f"SUMS{texel}": place for place, texel in enumerate(blended) if texel}
-        self.draw_transparent(
-            "gather/gather.frag", self.target(list(made.values())), {**places, "NEAREST": int(NEAREST in texels)}
-        )
+        # Each sum that is there has the next colour attachment, and after them the bins.
+        places = {f"SUMS{texel}": place for place, texel in enumerate(blended)}
+        sums = {**places, "NEAREST": int(NEAREST in texels)}
+        binned = self._bin_targets(bins) if bins else []
+        together = len(made) + len(binned) <= TARGETS
+        if texels and ((binned and not together) or not binned):
+            self.draw_transparent("gather/gather.frag", self.target(list(made.values())), {**sums, "BINS": 0})
+        if binned:
+            before = list(made.values()) if together else []
+            defines = {**(sums if together else {"NEAREST": 0}), "BINS": bins, "BIN0": len(before), **BIN_DEFINES}
+            self.draw_transparent("gather/gather.frag", self.target([*before, *binned]), defines)
+            gathered.bins, gathered.front = bins, self._pack(bins, binned)
         self.ctx.memory_barrier()
         return gathered
+
+    def _zero_targets(self, count: int, dtype: str) -> list[moderngl.Texture]:
+        """Textures of four components, zero."""
+        made = [self.ctx.texture((self.width, self.height), 4, dtype=dtype) for _ in range(count)]
+        for texture in made:
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            self.zero(texture)
+        return made
+
+    def _bin_targets(self, bins: int) -> list[moderngl.Texture]:
+        """The optical depth, float32, and the depth bins, 16 bits each that blending adds and clamps exactly; zero."""
+        return [*self.float_targets(1), *self._zero_targets(bins // 4, "nu2")]
+
+    def _pack(self, bins: int, binned: list[moderngl.Texture]) -> moderngl.Buffer:
+        """The gathered depth bins as words."""
+        packed = self.buffer(self.pixels * front_bytes(bins) // 4, 0)
+        program = self.gpu.programs.compute("gather/pack.comp", {"BINS": bins, **BIN_DEFINES})
+        packed.bind_to_storage_buffer(0)
+        for unit, texture in enumerate(binned):
+            texture.use(unit)
+        set_uniforms(program, {"width": self.width, "pixels": self.pixels})
+        groups = -(-self.pixels // 64)
+        program.run(min(groups, 1024), -(-groups // 1024))
+        return packed

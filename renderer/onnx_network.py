@@ -32,10 +32,12 @@ class OnnxNetwork:
             model.read_bytes(), options, providers=["CPUExecutionProvider"]
         )
 
+        self._outputs = [output.name for output in self._session.get_outputs()]
+
     def run(self, features: NDArray[np.float32]) -> NDArray[np.float32]:
-        """float32 [M, 2], a and b of every row of float32 [M, features]."""
-        gain = np.empty((len(features), 2), dtype=np.float32)
+        """float32 [M, outputs], what the network answers to every row of float32 [M, features]."""
+        answers = np.empty((len(features), len(self._outputs)), dtype=np.float32)
         for first in range(0, len(features), ROWS):
             part = slice(first, first + ROWS)
-            gain[part, 0], gain[part, 1] = self._session.run(["a", "b"], {"features": features[part]})
-        return gain
+            answers[part] = np.stack(self._session.run(self._outputs, {"features": features[part]}), axis=1)
+        return answers

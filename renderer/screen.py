@@ -12,6 +12,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer import timing
 from renderer.frame import Frame
 from renderer.gpu_scene import set_uniforms
 from renderer.programs import Defines
@@ -107,5 +108,6 @@ def _draw(
 
 def read_linear(frame: Frame, image: moderngl.Texture) -> NDArray[np.float32]:
     """An RGBA32F texture as float32 [H, W, 3]."""
-    rgba = np.frombuffer(image.read(), dtype=np.float32).reshape(frame.height, frame.width, 4)
-    return np.ascontiguousarray(rgba[:, :, :3])
+    with timing.readback(frame.ctx):
+        rgba = np.frombuffer(image.read(), dtype=np.float32).reshape(frame.height, frame.width, 4)
+        return np.ascontiguousarray(rgba[:, :, :3])

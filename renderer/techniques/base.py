@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.frame import Frame
-from schemas.tail import DENSITY_G, TailName
+from schemas.tail import DEFAULT_TAIL, DENSITY_G, TailName
 
 ChainForm = Literal["auto", "one-pass", "two-pass"]
 """How the bounded techniques find the nearest fragments: `auto` is one pass where the driver has 64-bit atomics."""
@@ -28,7 +28,7 @@ class Budget:
     """
 
     fragments: int
-    tail: TailName = "density"
+    tail: TailName = DEFAULT_TAIL
     g: float = DENSITY_G
     chain: ChainForm = "auto"
 
@@ -43,7 +43,8 @@ class Rendered:
         passes: Milliseconds of each pass, in order; shared passes (opaque, count, gather) as first measured.
         captured: Sum of k.
         pool_bytes: Bytes of storage that depend on the number of fragments or slots.
-        pixel_bytes: Bytes a pixel of all other buffers that live at the same time; the picture itself is not counted.
+        pixel_bytes: Bytes a pixel of all other buffers that live at the same time: together with the pool the peak of
+            the frame, also where it comes before the pool is there. The picture itself is not counted.
         skips: What was not needed and is exact without it: words -> how often. See `renderer.techniques.skips`.
     """
 

@@ -21,13 +21,14 @@ from numpy.typing import NDArray
 
 from renderer.bands import row_bands
 from renderer.csr import offsets_of
-from renderer.frame import Clock, Frame, Gathered
+from renderer.frame import BIN_DEFINES, Clock, Frame, Gathered
+from renderer.programs import Defines
 from renderer.screen import TURNS, read_linear, resolve_screen
 from renderer.techniques.base import Budget, Rendered
 from renderer.techniques.skips import PREDICTOR, TAIL, frame_skips
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
-from schemas.tail import MAX_EXPONENT, TailName
+from schemas.tail import DENSITY_BINS, MAX_EXPONENT, TailName
 
 SLOT_BYTES = 8
 """Depth and packed colour."""
@@ -35,19 +36,26 @@ SLOT_BYTES = 8
 _EXTENSIONS = frozenset({"GL_NV_shader_atomic_int64", "GL_ARB_gpu_shader_int64"})
 _EMPTY = 0xFFFFFFFF
 _TAIL_CODES: dict[TailName, int] = {"exact-coverage": 0, "density": 1, "weighted-average": 2, "paper": 3}
+_BINNED = 4
 _NO_TAIL = -1
 
 # Storage bindings of kbuffer/*.frag; the slots of the one-pass chain are where the colours of the other are.
-_OFFSETS, _DEPTHS, _COLOURS, _Z_MIN, _Z_MAX = range(5)
+_OFFSETS, _DEPTHS, _COLOURS, _Z_MIN, _Z_MAX, _FRONT = range(6)
 
 
 @dataclass(frozen=True, slots=True)
 class _Tail:
-    """What the tail needs: its code in the shaders, the density tail's constant and the pixel's optical depth."""
+    """What the tail needs: its code in the shaders, the density tail's constant, where the optical depth lies."""
 
     code: int
     g: float
-    sums: moderngl.Texture | None
+    gathered: Gathered | None
+
+    @property
+    def defines(self) -> Defines:
+        """Of the shaders."""
+        bins = self.gathered.bins if self.code == _BINNED and self.gathered is not None else 0
+        return {"TAIL": self.code, **({"BINS": bins, **BIN_DEFINES} if bins else {})}
 
 
 def one_pass_available(ctx: moderngl.Context) -> bool:
@@ -80,20 +88,16 @@ def render_chain(
         Problem: The pool is larger than a storage buffer may be, or the driver lacks the form that was asked for.
     """
     complete = bool((slots >= n).all())
-    if gathered is None and budget.tail == "density" and not complete:
-        gathered = frame.gather("gather-tail")
-    sums = None if gathered is None else gathered.sums[0]
+    if not complete:
+        gathered = gathered_for_tail(frame, budget, gathered)
     needed = ["count"] if gathered is None else ["count", gathered.name]
-    tail = _Tail(_NO_TAIL if complete else _TAIL_CODES[budget.tail], budget.g, sums)
     clock = Clock(frame.ctx)
     with clock.measure("prefix"):
         offsets = offsets_of(slots)
         offset_buffer = frame.ctx.buffer(offsets.astype(np.uint32))
-        offset_buffer.bind_to_storage_buffer(_OFFSETS)
     _check_turns(offsets)
     total = int(offsets[-1])
-    chain = _one_pass if _is_one_pass(frame.ctx, budget, total) else _two_pass
-    image = chain(frame, clock, total, tail)
+    image = draw_chain(frame, clock, offset_buffer, total, budget, gathered, complete=complete)
     k = np.minimum(slots, n).astype(np.int32)
     return Rendered(
         linear=read_linear(frame, image),
@@ -101,9 +105,59 @@ def render_chain(
         passes={**frame.passes("opaque", *needed), **clock.passes},
         captured=int(k.sum(dtype=np.int64)),
         pool_bytes=SLOT_BYTES * total,
-        pixel_bytes=_bytes_a_pixel(gathered, complete),
+        pixel_bytes=chain_bytes(gathered, None if complete else budget.tail),
         skips={**frame_skips(frame), TAIL: int(complete)},
     )
+
+
+def draw_chain(
+    frame: Frame,
+    clock: Clock,
+    offsets: moderngl.Buffer,
+    total: int,
+    budget: Budget,
+    gathered: Gathered | None,
+    *,
+    complete: bool,
+) -> moderngl.Texture:
+    """The passes of the chain, from slots that are on the GPU to the picture.
+
+    Args:
+        frame: The view.
+        clock: Gets the passes.
+        offsets: uint32 [P+1], where each pixel's run of slots begins.
+        total: Slots of the pool; at least the last offset.
+        budget: As `render_chain` has it.
+        gathered: What the tail needs, from `gathered_for_tail`.
+        complete: Whether every fragment is known to have a slot: then there is no tail.
+
+    Returns:
+        RGBA32F, linear.
+
+    Raises:
+        Problem: As `render_chain` has it.
+    """
+    offsets.bind_to_storage_buffer(_OFFSETS)
+    code = _BINNED if budget.tail in DENSITY_BINS else _TAIL_CODES[budget.tail]
+    tail = _Tail(_NO_TAIL if complete else code, budget.g, gathered)
+    chain = _one_pass if _is_one_pass(frame.ctx, budget, total) else _two_pass
+    return chain(frame, clock, total, tail)
+
+
+def gathered_for_tail(frame: Frame, budget: Budget, gathered: Gathered | None) -> Gathered | None:
+    """What a tail reads while fragments are captured: what is gathered already, if that serves it.
+
+    Args:
+        frame: The view.
+        budget: Its tail.
+        gathered: What the technique has gathered to choose its slots, if anything.
+    """
+    bins = DENSITY_BINS.get(budget.tail, 0)
+    if bins:
+        return gathered if gathered is not None and gathered.bins == bins else frame.gather("gather-tail", bins=bins)
+    if budget.tail == "density" and (gathered is None or gathered.bins):
+        return frame.gather("gather-tail")
+    return gathered
 
 
 def render_complete(frame: Frame, n: NDArray[np.integer], budget: Budget) -> Rendered | None:
@@ -120,9 +174,10 @@ def render_complete(frame: Frame, n: NDArray[np.integer], budget: Budget) -> Ren
     return replace(rendered, skips={**rendered.skips, PREDICTOR: 1})
 
 
-def _bytes_a_pixel(gathered: Gathered | None, complete: bool) -> int:
-    """Offsets, n and depth range, the tail's two targets, and what the gather pass left alive."""
-    return 4 + 12 + (0 if complete else 2 * 16) + (0 if gathered is None else gathered.pixel_bytes)
+def chain_bytes(gathered: Gathered | None, tail: TailName | None) -> int:
+    """Bytes a pixel: offsets, n and depth range, the tail's targets if there is one, what the gather pass left."""
+    targets = 0 if tail is None else 16 if tail in DENSITY_BINS else 2 * 16
+    return 4 + 12 + targets + (0 if gathered is None else gathered.pixel_bytes)
 
 
 def _is_one_pass(ctx: moderngl.Context, budget: Budget, total: int) -> bool:
@@ -145,7 +200,7 @@ def _one_pass(frame: Frame, clock: Clock, total: int, tail: _Tail) -> moderngl.T
         slots.bind_to_storage_buffer(_COLOURS)
         tails = _draw_with_tail(frame, "kbuffer/chain.frag", tail)
     with clock.measure("resolve"):
-        return _resolve(frame, tail.code, tails, stride=2)
+        return _resolve(frame, tail, tails, stride=2)
 
 
 def _two_pass(frame: Frame, clock: Clock, total: int, tail: _Tail) -> moderngl.Texture:
@@ -158,28 +213,30 @@ def _two_pass(frame: Frame, clock: Clock, total: int, tail: _Tail) -> moderngl.T
     with clock.measure("chain-colour"):
         tails = _draw_with_tail(frame, "kbuffer/chain_colour.frag", tail)
     with clock.measure("resolve"):
-        return _resolve(frame, tail.code, tails, stride=1)
+        return _resolve(frame, tail, tails, stride=1)
 
 
 def _draw_with_tail(frame: Frame, fragment: str, tail: _Tail) -> list[moderngl.Texture]:
-    """Draw into the bound slots; the two targets that hold the tail's sums, or none."""
+    """Draw into the bound slots; the targets that hold the tail's sums, or none."""
     tails: list[moderngl.Texture] = []
     if tail.code != _NO_TAIL:
-        tails = frame.float_targets(4, 4)
+        tails = frame.float_targets(*[4] * (1 if tail.code == _BINNED else 2))
         _, z_min, z_max = frame.depth_range()
         z_min.bind_to_storage_buffer(_Z_MIN)
         z_max.bind_to_storage_buffer(_Z_MAX)
-        if tail.sums is not None:
-            tail.sums.use(0)
-    defines = {"TAIL": tail.code, "MAX_EXPONENT": MAX_EXPONENT}
+        if tail.gathered is not None:
+            tail.gathered.sums[0].use(0)
+            if tail.gathered.front is not None:
+                tail.gathered.front.bind_to_storage_buffer(_FRONT)
+    defines = {**tail.defines, "MAX_EXPONENT": MAX_EXPONENT}
     frame.draw_transparent(fragment, frame.target(tails), defines, gathered=0, density_g=tail.g)
     frame.ctx.memory_barrier()
     return tails
 
 
-def _resolve(frame: Frame, tail_code: int, tails: list[moderngl.Texture], stride: int) -> moderngl.Texture:
+def _resolve(frame: Frame, tail: _Tail, tails: list[moderngl.Texture], stride: int) -> moderngl.Texture:
     """Composite the bound pool (offsets, colours) over the tail and the background; RGBA32F, linear."""
-    defines = {"TAIL": tail_code, "STRIDE": stride}
+    defines = {**tail.defines, "STRIDE": stride}
     return resolve_screen(frame, "kbuffer/resolve.frag", [frame.background, *tails], defines, first_row=0)
 
 

@@ -1,8 +1,16 @@
-"""`kbuffer-deep`: k(p) from a bundle's network, run as its own GLSL on sums gathered in the frame (METHOD.md 4)."""
+"""`kbuffer-deep`: k(p) from a bundle's network, run as its own GLSL on sums gathered in the frame (METHOD.md 4).
+
+Nothing is read back within a frame: the network's curves stay on the GPU, where the one lambda is found that uses the
+budget (`renderer.allocation.gpu`), and the pool has as many slots as the budget allows. What the network has read is
+given back before fragments are captured; its curves are kept, so that another budget of the same frame needs no
+inference.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import re
+import weakref
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -10,25 +18,59 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.allocation.fill import feasible_k_min, solve_lambda
-from renderer.features import texels_of
-from renderer.frame import ALL_TEXELS, Clock, Frame
+from renderer import timing
+from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
+from renderer.allocation.gpu import CURVE_BYTES, CURVE_DEFINES, LIST_BYTES, FrameAllocation, GpuAllocation
+from renderer.features import TEXELS, texels_of
+from renderer.frame import ALL_TEXELS, BIN_DEFINES, Clock, Frame, Gathered
 from renderer.gpu_scene import set_uniforms
 from renderer.onnx_network import OnnxNetwork
+from renderer.programs import Defines
+from renderer.screen import read_linear
 from renderer.techniques.base import Budget, Rendered
-from renderer.techniques.chain import render_chain, render_complete
-from renderer.techniques.skips import SETTLED_PIXELS, UNREAD_SUMS
+from renderer.techniques.chain import (
+    SLOT_BYTES,
+    chain_bytes,
+    draw_chain,
+    gathered_for_tail,
+    render_chain,
+    render_complete,
+)
+from renderer.techniques.skips import PREDICTOR, SETTLED_PIXELS, TAIL, UNREAD_SUMS, frame_skips
 from schemas.bundle import GLSL, ONNX, load_manifest
 from schemas.limits import LIMITS
+from schemas.tail import DENSITY_BINS
 
 Inference = Literal["glsl", "onnx"]
+Solver = Literal["gpu", "cpu"]
 
 _GROUP = 64
 _DISPATCH = 65535 * _GROUP
 """Pixels of one dispatch: the least maximum of work groups that GL promises."""
+_RANGE_BYTES = 12
+"""n and depth range of a pixel."""
 
-# Storage bindings of kbuffer-deep/predict.comp; its textures are bound in the order of its declarations.
+# Storage bindings of kbuffer-deep/*.comp; their textures are bound in the order of their declarations.
 _PIXELS, _Z_MIN, _Z_MAX, _NEAREST, _RESULT = range(5)
+_COUNTS, _FRONT = 6, 7
+_STATE, _LIST, _CURVES = 0, 4, 5
+
+
+@dataclass(frozen=True, slots=True)
+class _Prediction:
+    """What the network answered in a frame, kept for its other budgets."""
+
+    frame: weakref.ref[Frame]
+    gathered: Gathered
+    curves: moderngl.Buffer
+    passes: dict[str, float]
+    gather_bytes: int
+    k_min: int
+    occupied: int
+
+    def serves(self, frame: Frame, fragments: int) -> bool:
+        """Whether a budget of a frame can be solved with it: with a lower k_min more pixels need curves."""
+        return self.frame() is frame and int(fragments >= self.occupied) >= self.k_min
 
 
 class KBufferDeep:
@@ -38,32 +80,113 @@ class KBufferDeep:
         bundle: Folder of a bundle; its hashes are verified.
         inference: `glsl`: the bundle's shader; `onnx`: onnxruntime on features that are read back, for machines whose
             "GPU" is the CPU, where a shader's matrix products do not use its vector units well.
+        solver: Where the slots are chosen: `gpu` in compute passes, `cpu` in numpy with two readbacks; None: where the
+            network runs, importances on the CPU. The counts are the same but for ties and roundings.
 
     Raises:
         Problem: The bundle is damaged or not understood.
+        ValueError: The GPU is to solve what onnxruntime predicts, or importances.
     """
 
     name = "kbuffer-deep"
 
-    def __init__(self, bundle: Path, inference: Inference = "glsl") -> None:
+    def __init__(self, bundle: Path, inference: Inference = "glsl", solver: Solver | None = None) -> None:
         self.manifest = load_manifest(bundle)
+        if solver == "gpu" and (inference == "onnx" or self.manifest.head != "gain-curve"):
+            raise ValueError("the GPU solves gain curves that GLSL predicts")
         self._texts = {"bundle/predict.glsl": (bundle / GLSL).read_text(encoding="utf-8")}
-        self._texels = texels_of(self.manifest.feature_names)
+        self._bins = DENSITY_BINS.get(self.manifest.tail.name, 0)
+        self._texels = texels_of(self.manifest.feature_names, binned=bool(self._bins))
+        self._unread = len(ALL_TEXELS - self._texels - (frozenset() if self._bins else {0}))  # what is not gathered
+        # Bundles of format 1 were written when there were fewer sums.
+        texels = re.search(r"in vec4 s\[(\d+)\]", self._texts["bundle/predict.glsl"])
+        self._defines: Defines = {
+            **{"TEXELS": TEXELS if texels is None else int(texels[1]), "BINS": self._bins},
+            **(BIN_DEFINES if self._bins else {}),
+        }
         self._network = OnnxNetwork(bundle / ONNX) if inference == "onnx" else None
+        in_frame = inference == "glsl" and self.manifest.head == "gain-curve"
+        self._solver = solver or ("gpu" if in_frame else "cpu")
+        self._allocation: GpuAllocation | None = None
+        self._prediction: _Prediction | None = None
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame with predicted slots; the budget is met exactly where it is below N."""
+        # A pool larger than a buffer may be is bounded by N, which has to be read for that.
+        if self._solver == "cpu" or frame.counted or 4 * budget.fragments > LIMITS.buffer_bytes:
+            complete = render_complete(frame, frame.count(), budget)
+            if complete is not None:
+                return complete
+        return self._render_on_cpu(frame, budget) if self._solver == "cpu" else self._render_on_gpu(frame, budget)
+
+    def _render_on_gpu(self, frame: Frame, budget: Budget) -> Rendered:
+        counts, _, _ = frame.depth_range()
+        if self._allocation is None:
+            self._allocation = GpuAllocation(frame.ctx)
+        kept = self._prediction if self._prediction and self._prediction.serves(frame, budget.fragments) else None
+        gathered = frame.gather("gather", self._texels, self._bins) if kept is None else kept.gathered
+        gather_bytes = gathered.pass_bytes if kept is None else kept.gather_bytes
+        clock = Clock(frame.ctx)
+        with clock.measure("select"):
+            allocation = self._allocation.select(frame.gpu.programs, counts, frame.pixels, budget.fragments)
+        if kept is None:
+            with clock.measure("predict"):
+                curves = self._curves(frame, gathered, allocation)
+            gathered = frame.retire(gathered)
+        else:
+            curves = kept.curves
+            clock.passes |= kept.passes
+        with clock.measure("lambda"):
+            allocation.solve(curves)
+        with clock.measure("prefix"):
+            offsets = allocation.place()
+        for_tail = gathered_for_tail(frame, budget, gathered)
+        read = [] if for_tail is None or for_tail.name == "gather" else [for_tail.name]
+        image = draw_chain(frame, clock, offsets, budget.fragments, budget, for_tail, complete=False)
+        linear = read_linear(frame, image)
+        # The frame is over: what follows are its statistics.
+        state = allocation.read_state()
+        k = np.diff(np.frombuffer(offsets.read(), dtype=np.uint32).astype(np.int64)).astype(np.int32)
+        if kept is None and not state.complete:
+            predicted = {"predict": clock.passes["predict"]}
+            self._prediction = _Prediction(
+                weakref.ref(frame), gathered, curves, predicted, gather_bytes, state.k_min, state.occupied
+            )
+        pool_bytes = SLOT_BYTES * budget.fragments
+        before = _RANGE_BYTES + LIST_BYTES + CURVE_BYTES + gather_bytes  # while the network runs; there is no pool yet
+        skips = {PREDICTOR: int(state.complete), SETTLED_PIXELS: state.settled, TAIL: 0}
+        return Rendered(
+            linear=linear,
+            k=k,
+            passes={**frame.passes("opaque", "count", "gather", *read), **clock.passes},
+            captured=int(k.sum(dtype=np.int64)),
+            pool_bytes=pool_bytes,
+            pixel_bytes=max(chain_bytes(for_tail, budget.tail) + CURVE_BYTES, before - pool_bytes // frame.pixels),
+            skips={**frame_skips(frame), **skips, UNREAD_SUMS: self._unread},
+        )
+
+    def _curves(self, frame: Frame, gathered: Gathered, allocation: FrameAllocation) -> moderngl.Buffer:
+        """Run the network on the listed pixels."""
+        program = frame.gpu.programs.compute(
+            "kbuffer-deep/curves.comp", {**CURVE_DEFINES, **self._defines}, self._texts
+        )
+        curves = frame.ctx.buffer(reserve=CURVE_BYTES * frame.pixels)
+        self._bind(frame, gathered)
+        for binding, buffer in ((_LIST, allocation.listed), (_CURVES, curves)):
+            buffer.bind_to_storage_buffer(binding)
+        set_uniforms(program, {"width": frame.width})
+        allocation.run_listed(program, _STATE)
+        return curves
+
+    def _render_on_cpu(self, frame: Frame, budget: Budget) -> Rendered:
         n = frame.count()
-        complete = render_complete(frame, n, budget)
-        if complete is not None:
-            return complete
-        gathered = frame.gather("gather", self._texels)
+        gathered = frame.gather("gather", self._texels, self._bins)
         clock = Clock(frame.ctx)
         slots, settled = self._allocate(frame, n, budget.fragments, clock)
         rendered = render_chain(frame, slots, n, budget, gathered)
-        unread = len(ALL_TEXELS - self._texels - {0})  # n is always gathered
-        skips = {**rendered.skips, SETTLED_PIXELS: settled, UNREAD_SUMS: unread}
-        return replace(rendered, passes={**rendered.passes, **clock.passes}, skips=skips)
+        skips = {**rendered.skips, SETTLED_PIXELS: settled, UNREAD_SUMS: self._unread}
+        shared = frame.passes("opaque", "count", "gather")
+        return replace(rendered, passes={**shared, **clock.passes, **rendered.passes}, skips=skips)
 
     def _allocate(
         self, frame: Frame, n: NDArray[np.uint32], fragments: int, clock: Clock
@@ -77,11 +200,13 @@ class KBufferDeep:
         if len(open_pixels) == 0:
             return slots, settled
         with clock.measure("predict"):
-            gain = self.predict(frame, open_pixels)
+            answers = self.predict(frame, open_pixels)
         with clock.measure("lambda"):
             left = fragments - int(slots.sum(dtype=np.int64)) + k_min * len(open_pixels)
-            chosen, _ = solve_lambda(gain[:, 0], gain[:, 1], n[open_pixels], left, k_min)
-            slots[open_pixels] = chosen
+            if self.manifest.head == "importance":
+                slots[open_pixels] = budget_fill(answers[:, 0], n[open_pixels], left, k_min)
+            else:
+                slots[open_pixels], _ = solve_lambda(answers[:, 0], answers[:, 1], n[open_pixels], left, k_min)
         return slots, settled
 
     def predict(self, frame: Frame, pixels: NDArray[np.uint32]) -> NDArray[np.float32]:
@@ -92,11 +217,11 @@ class KBufferDeep:
             pixels: uint32 [M], pixel indices.
 
         Returns:
-            float32 [M, 2]: a and b of `log gain(k) = a - b (k - 1)`.
+            float32 [M, outputs of the bundle]: `schemas.bundle.HEADS` says what they are.
         """
         if self._network is not None:
             return self._network.run(self.features(frame, pixels))
-        return self._dispatch(frame, pixels, 2, features_only=False)
+        return self._dispatch(frame, pixels, len(self.manifest.outputs), features_only=False)
 
     def features(self, frame: Frame, pixels: NDArray[np.uint32]) -> NDArray[np.float32]:
         """What the network reads of some pixels.
@@ -114,18 +239,15 @@ class KBufferDeep:
         self, frame: Frame, pixels: NDArray[np.uint32], columns: int, *, features_only: bool
     ) -> NDArray[np.float32]:
         """Run the compute shader on all pixels, as many at once as a storage buffer has rows for."""
-        gathered = frame.gather("gather", self._texels)
-        _, z_min, z_max = frame.depth_range()
-        defines = {"FEATURES_ONLY": int(features_only)}
+        gathered = frame.gather("gather", self._texels, self._bins)
+        what = {"FEATURES_ONLY": int(features_only), "OUTPUTS": len(self.manifest.outputs)}
+        defines = {**what, **self._defines}
         program = frame.gpu.programs.compute("kbuffer-deep/predict.comp", defines, self._texts)
         rows = min(len(pixels), _DISPATCH, LIMITS.buffer_bytes // (4 * columns))
         result, listed = frame.ctx.buffer(reserve=4 * columns * rows), frame.ctx.buffer(pixels)
-        nearest = gathered.nearest_colour or z_min  # a bundle that does not read it gets any buffer
-        buffers = {_PIXELS: listed, _Z_MIN: z_min, _Z_MAX: z_max, _NEAREST: nearest, _RESULT: result}
-        for binding, buffer in buffers.items():
-            buffer.bind_to_storage_buffer(binding)
-        for unit, texture in enumerate([*gathered.sums, frame.background]):
-            texture.use(unit)
+        self._bind(frame, gathered)
+        listed.bind_to_storage_buffer(_PIXELS)
+        result.bind_to_storage_buffer(_RESULT)
         set_uniforms(program, {"width": frame.width, "pixels": len(pixels)})
         out = np.empty((len(pixels), columns), dtype=np.float32)
         for first in range(0, len(pixels), rows):
@@ -133,5 +255,18 @@ class KBufferDeep:
             set_uniforms(program, {"first": first})
             program.run(-(-len(part) // _GROUP))
             frame.ctx.memory_barrier(moderngl.BUFFER_UPDATE_BARRIER_BIT | moderngl.SHADER_STORAGE_BARRIER_BIT)
-            result.read_into(part.reshape(-1).view(np.uint8), size=part.nbytes)
+            with timing.readback(frame.ctx):
+                result.read_into(part.reshape(-1).view(np.uint8), size=part.nbytes)
         return out
+
+    @staticmethod
+    def _bind(frame: Frame, gathered: Gathered) -> None:
+        """Bind what `kbuffer-deep/inputs.glsl` reads."""
+        counts, z_min, z_max = frame.depth_range()
+        nearest = gathered.nearest_colour or z_min  # a bundle that does not read it gets any buffer
+        for binding, buffer in ((_COUNTS, counts), (_Z_MIN, z_min), (_Z_MAX, z_max), (_NEAREST, nearest)):
+            buffer.bind_to_storage_buffer(binding)
+        if gathered.front is not None:
+            gathered.front.bind_to_storage_buffer(_FRONT)
+        for unit, texture in enumerate([*gathered.sums, frame.background]):
+            texture.use(unit)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from renderer import timing
 from renderer.allocation.fill import budget_fill, feasible_k_min
 from renderer.allocation.importance import VkbOptions, vkb_importance
 from renderer.frame import Clock, Frame
 from renderer.techniques.base import Budget, Rendered
 from renderer.techniques.chain import render_chain, render_complete
+from schemas.tail import DENSITY_BINS
 
 
 class KBufferImportance:
@@ -29,11 +31,13 @@ class KBufferImportance:
         complete = render_complete(frame, n, budget)
         if complete is not None:
             return complete
-        gathered = frame.gather("gather-nearest")
+        gathered = frame.gather("gather-nearest", bins=DENSITY_BINS.get(budget.tail, 0))
         assert gathered.nearest_facing is not None, "this gather has the nearest fragment"
         clock = Clock(frame.ctx)
         with clock.measure("importance"):
-            facing = np.frombuffer(gathered.nearest_facing.read(4 * frame.pixels), dtype=np.uint32).astype(np.uint8)
+            with timing.readback(frame.ctx):
+                read = np.frombuffer(gathered.nearest_facing.read(4 * frame.pixels), dtype=np.uint32)
+            facing = read.astype(np.uint8)
             weights = vkb_importance(n, facing, frame.width, frame.height, self._options)
             slots = budget_fill(weights, n, budget.fragments, feasible_k_min(n, budget.fragments))
         rendered = render_chain(frame, slots, n, budget, gathered)

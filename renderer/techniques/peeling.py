@@ -13,6 +13,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer import timing
 from renderer.frame import Clock, Frame
 from renderer.screen import read_linear
 from renderer.techniques.bands import equal_rows, in_bands, listed, over_pixels
@@ -88,9 +89,11 @@ def _peel(frame: Frame, clock: Clock, shaders: str, sides: int, first: int, rows
 def _first_state(frame: Frame, sides: int, begin: int, end: int) -> NDArray[np.void]:
     """Sides [(end - begin) * sides]: the nearest depth, and from behind the farthest one; `OVER` where nothing is."""
     _, z_min, z_max = frame.depth_range()
-    nearest, farthest = (
-        np.frombuffer(buffer.read(4 * (end - begin), offset=4 * begin), dtype=np.uint32) for buffer in (z_min, z_max)
-    )
+    with timing.readback(frame.ctx):
+        nearest, farthest = (
+            np.frombuffer(buffer.read(4 * (end - begin), offset=4 * begin), dtype=np.uint32)
+            for buffer in (z_min, z_max)
+        )
     state = np.zeros((end - begin, sides), dtype=SIDE)
     state["next_depth"] = state["next_colour"] = OVER
     state["depth"] = np.stack([nearest, ~farthest], axis=1)[:, :sides]
@@ -101,4 +104,5 @@ def _step(frame: Frame, shader: str, pixels: int, active: moderngl.Buffer) -> in
     """Composite what a pass has found; how many pixels are not finished."""
     active.write(np.zeros(1, dtype=np.uint32))
     over_pixels(frame, shader, pixels)
-    return int(np.frombuffer(active.read(), dtype=np.uint32)[0])
+    with timing.readback(frame.ctx):
+        return int(np.frombuffer(active.read(), dtype=np.uint32)[0])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer import timing
 from renderer.bands import row_bands
 from renderer.csr import offsets_of, sort_fragments
 from renderer.frame import Clock, Frame
@@ -77,6 +78,7 @@ def capture_band(
     pool.bind_to_storage_buffer(1)
     frame.draw_transparent(fragment, frame.target([]), scissor=band, ranked=ranked, first_row=first)
     frame.ctx.memory_barrier()
-    pool.read_into(into[base:stop])
+    with timing.readback(frame.ctx):
+        pool.read_into(into[base:stop])
     cursor.release()
     pool.release()

@@ -8,7 +8,7 @@ from renderer.screen import empty_tiles
 EMPTY_TILES = "empty tiles"
 """Tiles of the window without a transparent fragment: no pass over pixels visits them."""
 PREDICTOR = "predictor runs"
-"""The budget holds every fragment: nothing is gathered, predicted or solved."""
+"""The budget holds every fragment: nothing is predicted or solved; nor gathered, where N is known by then."""
 TAIL = "tails"
 """Every fragment has a slot: no tail is gathered or blended."""
 SETTLED_PIXELS = "pixels settled without the predictor"

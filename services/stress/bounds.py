@@ -102,6 +102,13 @@ BOUNDS: Final[dict[str, Bound]] = {
     "fill.lambda": Bound(
         1e-12, "relative", 1.0, "The same with `t = -log lambda`; relative to the largest `|a| + n b` of the view."
     ),
+    "fill.lattice": Bound(
+        2.5e-4,
+        "relative",
+        1.0,
+        "The same for the float32 form on a lattice of prices, which the compute passes share: prices near t are "
+        "2^-13 (1 + |t|) apart, and what grows between two of them is handed out by pixel index.",
+    ),
     "fill.order": Bound(
         0.0,
         "absolute",

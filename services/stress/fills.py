@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from labeller.curves import Curves
 from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
+from renderer.allocation.lattice import curves_of, solve_on_lattice
 from schemas.tail import DENSITY_G
 from services.stress.allocations import edge_budgets
 from services.stress.bounds import counted, within
@@ -34,7 +35,11 @@ def run(options: Options) -> Iterator[Finding]:
     for name, (a, b) in gain_cases(rng, pixels).items():
         found = [(f, solve_lambda(a, b, n, f, feasible_k_min(n, f))[0]) for f in edge_budgets(n)]
         limits.append(_limits(f"gains {name}", n, found))
-        yield _order_of_gains(name, n, a, b, found)
+        yield _order_of_gains("fill.lambda", name, n, a, b, found)
+        curves = curves_of(a, b)
+        found = [(f, solve_on_lattice(curves, n, f).k) for f in edge_budgets(n)]
+        limits.append(_limits(f"gains {name} on the lattice", n, found))
+        yield _order_of_gains("fill.lattice", name, n, a, b, found)
     yield worst_of(limits, f"{len(limits)} inputs, every F")
     yield from _sums(rng, 100_000 if options.quick else 10_000_000)
 
@@ -93,7 +98,9 @@ def _order_of_weights(name: str, n: Counts, weights: Numbers, found: list[tuple[
     return within("fill.budget", name, np.array(late), np.zeros(len(late)), places)
 
 
-def _order_of_gains(name: str, n: Counts, a: Numbers, b: Numbers, found: list[tuple[int, Counts]]) -> Finding:
+def _order_of_gains(
+    path: str, name: str, n: Counts, a: Numbers, b: Numbers, found: list[tuple[int, Counts]]
+) -> Finding:
     """A pixel's j-th fragment comes at the price `a - (j - 1.5) b`: what was given must not be below what was not."""
     gain, decay = a.astype(np.float64), b.astype(np.float64)
     late, places = [], []
@@ -105,7 +112,7 @@ def _order_of_gains(name: str, n: Counts, a: Numbers, b: Numbers, found: list[tu
         scale = float((np.abs(gain) + n * decay).max())
         late.append(max((highest - lowest) / scale, 0.0))
         places.append(f"F {budget}")
-    return within("fill.lambda", name, np.array(late), np.zeros(len(late)), places)
+    return within(path, name, np.array(late), np.zeros(len(late)), places)
 
 
 def _sums(rng: np.random.Generator, count: int) -> Iterator[Finding]:

@@ -116,6 +116,13 @@ BOUNDS: Final[dict[str, Bound]] = {
     "predict.features": Bound(
         INFORMATION, "relative", 1.0, "The network of float64 features: what the features' error does to its outputs."
     ),
+    "allocation": Bound(
+        0.0,
+        "absolute",
+        1.0,
+        "Fragments by which a pixel's k differs from that of the same algorithm in numpy: every operation is rounded "
+        "by itself, so that nothing may.",
+    ),
 }
 """Fast path, without its driver -> bound, for up to 100 fragments a pixel."""
 

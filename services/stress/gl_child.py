@@ -23,7 +23,7 @@ import numpy as np
 from renderer.context import describe, gl_context
 from renderer.programs import Programs
 from schemas.problem import Problem
-from services.stress import gl_capture, gl_moment, gl_network, gl_techniques
+from services.stress import gl_allocation, gl_capture, gl_moment, gl_network, gl_techniques
 from services.stress.findings import Broken, Finding, NotRun, Options, Row
 from services.stress.gl_cases import Scenery, make_case, sceneries
 from services.stress.gl_drivers import DRIVERS, Driver
@@ -66,6 +66,8 @@ class Suite:
         yield from worst_rows(self._step("predict.glsl", "adverse features", adverse))
         lists = partial(gl_moment.rows, self._ctx, self._options, self._driver)
         yield from worst_rows(self._step("moment.arithmetic", "lists", lists))
+        curves = partial(gl_allocation.rows, self._ctx, self._options, self._driver)
+        yield from worst_rows(self._step("allocation", "gain curves", curves))
 
     def _scenery(self, scenery: Scenery, weights: Weights, bundle: Path) -> Iterator[Row]:
         self._say({"at": f"upload, {scenery.name}"})

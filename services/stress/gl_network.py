@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.features import FEATURES, SUMS
+from renderer.features import FEATURES, SUMS, derive
 from renderer.frame import Frame, Gathered
 from renderer.techniques import KBufferDeep
 from schemas.bundle import GLSL, ParityReport, Provenance, TailSpec
@@ -21,8 +21,9 @@ from services.stress.gl_cases import Case, thinned
 from services.stress.predictors import Rows, feature_cases, predicted64
 from services.stress.twins import features64, network64, sums64
 from trainer.bundle import Description, write_bundle
-from trainer.export_glsl import glsl_source
+from trainer.export_shader import shader_source
 from trainer.glsl_network import glsl_outputs
+from trainer.self_test import pixel_sums
 from trainer.weights import Weights
 
 _SUMMED = [i for i, name in enumerate(SUMS) if name not in ("z_min", "z_max", "unused") and i < SUMS.index("nearest_r")]
@@ -41,7 +42,7 @@ def random_bundle(folder: Path, weights: Weights, driver: str) -> Path:
         evaluation={},
     )
     parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver=driver)
-    write_bundle(folder, weights, description, lambda: parity)
+    write_bundle(folder, weights, description, derive(pixel_sums()), lambda: parity)
     return folder
 
 
@@ -90,7 +91,7 @@ def feature_rows(
     for name, weights in made.items():
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / GLSL
-            path.write_text(glsl_source(weights), encoding="utf-8")
+            path.write_text(shader_source(weights), encoding="utf-8")
             for case, inputs in feature_cases(rng, weights, real).items():
                 found, truth = glsl_outputs(path, inputs, ctx), predicted64(weights, inputs)
                 row = compared(

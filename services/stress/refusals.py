@@ -61,7 +61,7 @@ def run(options: Options) -> Iterator[Row]:
 
 def _networks(options: Options) -> Iterator[Row]:
     """Networks answer NaN with NaN, which the fill then refuses; one with a weight that is NaN is not exported."""
-    from trainer.export_glsl import glsl_source
+    from trainer.export_shader import shader_source
 
     real = real_features(np.random.default_rng(options.seed), 64)
     weights = next(iter(networks(options.seed, real).values()))
@@ -76,7 +76,7 @@ def _networks(options: Options) -> Iterator[Row]:
             gain = predict(damaged).astype(np.float64)
             yield _refusal(f"NaN as feature, {path}", partial(solve_lambda, gain[:, 0], gain[:, 1], n, 100, 1))
     weights.layers[0][0][0, 0] = np.nan
-    yield _refusal("NaN as weight of a network, GLSL", partial(glsl_source, weights))
+    yield _refusal("NaN as weight of a network, GLSL", partial(shader_source, weights))
 
 
 def _refusal(case: str, call: Callable[[], object]) -> Finding:

@@ -8,11 +8,12 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from labeller.reference import Pixel
+from labeller.reference import Pixel, binned_exponents
+from renderer.depth_bins import MOST_BINS
 from renderer.features import FEATURES, SUMS
 from schemas.bundle import FEATURE_LIMIT, GAIN_FLOOR
 from schemas.fragments import FragmentDump
-from schemas.tail import MAX_EXPONENT, TailName
+from schemas.tail import DENSITY_BINS, MAX_EXPONENT, TailName
 
 Extended = NDArray[np.longdouble]
 
@@ -40,10 +41,14 @@ def extended_composite(pixel: Pixel, k: int, tail: TailName, g: float) -> Extend
         optical_depth = -np.log(np.maximum(one - alpha, np.longdouble(1e-3))).sum()
         relative = (depth[k:] - depth[0]) / (depth[-1] - depth[0])
         weight = behind * np.exp(-np.minimum(g * optical_depth * relative, MAX_EXPONENT))
+    if tail in DENSITY_BINS and pixel.n:
+        optical = -np.log(np.maximum(one - alpha, np.longdouble(1e-3)))
+        exponent = binned_exponents(pixel.depth, optical, DENSITY_BINS[tail])[k:]
+        weight = behind * np.exp(-np.minimum(exponent, MAX_EXPONENT))
     if len(behind) == 0 or weight.sum() == 0.0:
         return np.asarray(core + through[k] * background)
     mean = (weight[:, None] * colour[k:]).sum(axis=0) / weight.sum()
-    if tail in ("density", "exact-coverage"):
+    if tail in ("density", "exact-coverage", *DENSITY_BINS):
         beyond = np.prod(one - behind)
     else:
         beyond = np.maximum(one - behind.sum() / len(behind), 0.0) ** len(behind)
@@ -76,7 +81,7 @@ def exact_hull(error: NDArray[np.float32], k_min: int) -> list[Fraction]:
 
 
 def sums64(dump: FragmentDump) -> NDArray[np.float64]:
-    """The raw sums of every pixel, float64 [P, 28], columns `renderer.features.SUMS`, each as its definition reads."""
+    """The raw sums of every pixel, float64 [P, 44], columns `renderer.features.SUMS`, each as its definition reads."""
     out = np.zeros((dump.pixels, len(SUMS)))
     for p in range(dump.pixels):
         part = slice(dump.offsets[p], dump.offsets[p + 1])
@@ -112,7 +117,7 @@ def sums64(dump: FragmentDump) -> NDArray[np.float64]:
 
 
 def features64(sums: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Features of raw sums in float64, [P, 26], columns `renderer.features.FEATURES`; zero where n = 0."""
+    """Features of raw sums in float64, [P, 41], columns `renderer.features.FEATURES`; zero where n = 0."""
     s = {name: sums[:, i].astype(np.float64) for i, name in enumerate(SUMS)}
     used = s["n"] > 0.5
     n = np.where(used, s["n"], 1.0)
@@ -140,6 +145,7 @@ def features64(sums: NDArray[np.floating]) -> NDArray[np.float64]:
                 f"rgb_std_{c}": spread(s[f"sum_{c}2"], s[f"sum_{c}"]),
                 f"rgb_depth_cov_{c}": s[f"sum_{c}_x"] / n - s[f"sum_{c}"] / n * s["sum_x"] / n,
             }
+        columns |= {f"front_{j}": s[f"front_{j}"] for j in range(1, MOST_BINS)}
     return np.where(used[:, None], np.stack([columns[name] for name in FEATURES], axis=1), 0.0)
 
 

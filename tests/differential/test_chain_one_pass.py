@@ -103,7 +103,7 @@ def test_enough_slots_need_no_tail(gl: moderngl.Context, dump: FragmentDump, for
         assert rendered.skips[TAIL] == 1
         assert set(rendered.passes) - {"histogram"} == {"opaque", "count", "prefix", "resolve"} | chain
         assert (rendered.pool_bytes, rendered.pixel_bytes) == (pool, 12 + 4)
-    one_less = KBuffer().render(fresh, Budget((most - 1) * dump.pixels, chain=form))
+    one_less = KBuffer().render(fresh, Budget((most - 1) * dump.pixels, "density", chain=form))
     assert one_less.skips[TAIL] == 0
     assert one_less.pixel_bytes == 12 + 4 + 16 + 2 * 16
 
@@ -122,6 +122,6 @@ def test_importance_is_not_computed_where_all_fits(gl: moderngl.Context, dump: F
 
 def test_no_slots_at_all_is_all_tail(frame: Frame, dump: FragmentDump, form: ChainForm) -> None:
     none = np.zeros(dump.pixels, dtype=np.int32)
-    rendered = render(frame, none, form)
+    rendered = render(frame, none, form, "density")
     assert rendered.pool_bytes == 0
-    np.testing.assert_allclose(rendered.linear, composite(dump, none).reshape(rendered.linear.shape), atol=3e-6, rtol=0)
+    np.testing.assert_allclose(rendered.linear, composite(dump, none, "density").reshape(rendered.linear.shape), atol=3e-6, rtol=0)

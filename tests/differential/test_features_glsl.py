@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from support.dumps import random_dump
 
-from renderer.features import FEATURES, derive, features_glsl, gather
+from renderer.features import FEATURES, TEXELS, derive, features_glsl, gather
 
 _MAIN = """
 layout(local_size_x = 64) in;
@@ -18,8 +18,8 @@ uniform uint rows;
 void main() {
     uint row = gl_GlobalInvocationID.x;
     if (row >= rows) return;
-    vec4 s[7];
-    for (int i = 0; i < 7; ++i) s[i] = sums[row * 7u + uint(i)];
+    vec4 s[TEXELS];
+    for (int i = 0; i < TEXELS; ++i) s[i] = sums[row * uint(TEXELS) + uint(i)];
     float x[DIAPHANE_FEATURES];
     diaphane_features(s, x);
     for (int i = 0; i < DIAPHANE_FEATURES; ++i) result[row * uint(DIAPHANE_FEATURES) + uint(i)] = x[i];
@@ -28,7 +28,7 @@ void main() {
 
 
 def run(ctx: moderngl.Context, names: tuple[str, ...], sums: NDArray[np.float32]) -> NDArray[np.float32]:
-    shader = ctx.compute_shader("#version 450\n" + features_glsl(names) + _MAIN)
+    shader = ctx.compute_shader(f"#version 450\n#define TEXELS {TEXELS}\n" + features_glsl(names) + _MAIN)
     source, target = ctx.buffer(sums.tobytes()), ctx.buffer(reserve=4 * len(sums) * len(names))
     source.bind_to_storage_buffer(0)
     target.bind_to_storage_buffer(1)
@@ -40,7 +40,7 @@ def run(ctx: moderngl.Context, names: tuple[str, ...], sums: NDArray[np.float32]
 
 @pytest.mark.parametrize("max_n", [2, 40])
 def test_glsl_features_are_the_numba_ones(ctx: moderngl.Context, max_n: int) -> None:
-    sums = gather(random_dump(200, 150, max_n, seed=max_n))
+    sums = gather(random_dump(200, 150, max_n, seed=max_n), bins=16)
     on_gpu, on_cpu = run(ctx, FEATURES, sums), derive(sums)
     spread = ["_std" in name for name in FEATURES]
     # A spread is the root of a difference of nearly equal numbers: one rounding of its square, 1e-7, is 3e-4 of it.

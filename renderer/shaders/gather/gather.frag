@@ -1,12 +1,15 @@
 #version 450
 // Order-independent sums over all fragments of a pixel, by additive blending (renderer/features.py: SUMS).
-// SUMS1 to SUMS4 are the colour attachments of the sums that are wanted besides the first; others are not defined.
+// SUMS0 to SUMS4 are the colour attachments of the sums that are wanted; others are not defined. With BINS, BIN0 is that
+// of the optical depth, and those that follow are the depth bins'.
 layout(early_fragment_tests) in;
 #include "common/surface.glsl"
 
 layout(std430, binding = 1) readonly buffer Nearest { uint z_min[]; };
 #if defined(SUMS1) || defined(SUMS2) || defined(SUMS3) || defined(SUMS4)
 #define RELATIVE_DEPTH
+#endif
+#if defined(RELATIVE_DEPTH) || BINS
 layout(std430, binding = 2) readonly buffer Farthest { uint z_max[]; };
 #endif
 #if NEAREST
@@ -15,7 +18,14 @@ layout(std430, binding = 4) buffer NearestFacing { uint nearest_facing[]; };
 #endif
 uniform int width;
 
-layout(location = 0) out vec4 sums0;  // n, sum a, sum a^2, sum -ln(1-a)
+#if BINS
+#include "common/depth_bins.glsl"
+layout(location = BIN0) out float binned_depth;       // sum -ln(1-a)
+layout(location = BIN0 + 1) out vec4 bins[BINS / 4];  // the same by bin, in whole units / BIN_LIMIT
+#endif
+#ifdef SUMS0
+layout(location = SUMS0) out vec4 sums0;  // n, sum a, sum a^2, sum -ln(1-a)
+#endif
 #ifdef SUMS1
 layout(location = SUMS1) out vec4 sums1;  // sum rgb, sum x
 #endif
@@ -35,13 +45,24 @@ void main() {
     if (!is_transparent(stored)) discard;
 #endif
     float a = float(stored.a) / 255.0;
-    sums0 = vec4(1.0, a, a * a, -log(1.0 - a));
+    float optical_depth = -log(1.0 - a);
+#ifdef SUMS0
+    sums0 = vec4(1.0, a, a * a, optical_depth);
+#endif
     int p = int(gl_FragCoord.y) * width + int(gl_FragCoord.x);
     uint z = floatBitsToUint(v_depth);
-#ifdef RELATIVE_DEPTH
-    vec3 rgb = vec3(stored.rgb) / 255.0;
+#if defined(RELATIVE_DEPTH) || BINS
     float nearest = uintBitsToFloat(z_min[p]);
     float extent = uintBitsToFloat(z_max[p]) - nearest;
+#endif
+#if BINS
+    int bin = min(int(bin_place(v_depth, nearest, extent)), BINS - 1);
+    float units = a > 0.0 ? max(1.0, floor(optical_depth * float(OPTICAL_UNIT) + 0.5)) / float(BIN_LIMIT) : 0.0;
+    for (int i = 0; i < BINS / 4; ++i) bins[i] = units * vec4(equal(ivec4(0, 1, 2, 3) + 4 * i, ivec4(bin)));
+    binned_depth = optical_depth;
+#endif
+#ifdef RELATIVE_DEPTH
+    vec3 rgb = vec3(stored.rgb) / 255.0;
     float x = extent > 0.0 ? (v_depth - nearest) / extent : 0.0;
 #endif
 #ifdef SUMS1

@@ -14,11 +14,6 @@ layout(std430, binding = 0) readonly buffer Offsets { uint offset[]; };  // [P+1
 layout(std430, binding = 2) coherent buffer Slots { uint64_t slot[]; };
 uniform int width;
 
-#if TAIL >= 0
-layout(location = 0) out vec4 tail_colour;   // sum w C, sum w
-layout(location = 1) out vec4 tail_opacity;  // sum -ln(1-a), sum a, count
-#endif
-
 void main() {
     uvec4 stored = stored_surface();
 #if MIXED
@@ -39,6 +34,6 @@ void main() {
     }
 #if TAIL >= 0
     uvec2 fallen = unpackUint2x32(key);
-    accumulate_tail(p, unpack(fallen.x), uintBitsToFloat(fallen.y), tail_colour, tail_opacity);
+    accumulate_tail(p, unpack(fallen.x), uintBitsToFloat(fallen.y));
 #endif
 }

@@ -13,11 +13,6 @@ layout(std430, binding = 1) readonly buffer Depths { uint depth[]; };
 layout(std430, binding = 2) coherent buffer Colours { uint colour[]; };
 uniform int width;
 
-#if TAIL >= 0
-layout(location = 0) out vec4 tail_colour;   // sum w C, sum w
-layout(location = 1) out vec4 tail_opacity;  // sum -ln(1-a), sum a, count
-#endif
-
 const uint EMPTY = 0xFFFFFFFFu;
 
 uint first_slot_not_nearer(uint begin, uint end, uint z) {
@@ -44,6 +39,6 @@ void main() {
         word = max(word, before);
     }
 #if TAIL >= 0
-    accumulate_tail(p, unpack(word), v_depth, tail_colour, tail_opacity);
+    accumulate_tail(p, unpack(word), v_depth);
 #endif
 }

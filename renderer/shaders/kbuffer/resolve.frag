@@ -2,13 +2,20 @@
 // Core front to back, then the tail, then the background (METHOD 2). Linear RGB out.
 // TAIL: -1 none (the pool holds every fragment), else as in tail.glsl. STRIDE: words of a slot; the first is the colour.
 #include "common/composite.glsl"
+#if TAIL == 4
+#include "common/depth_bins.glsl"
+#endif
 
 layout(std430, binding = 0) readonly buffer Offsets { uint offset[]; };  // [P+1]
 layout(std430, binding = 2) readonly buffer Colours { uint colour[]; };
 layout(binding = 0) uniform sampler2D background;
 #if TAIL >= 0
 layout(binding = 1) uniform sampler2D tail_colour;
+#if TAIL == 4
+layout(std430, binding = 5) readonly buffer DepthBins { uint kept[]; };  // [P, WORDS]; the first is D
+#else
 layout(binding = 2) uniform sampler2D tail_opacity;
+#endif
 #endif
 uniform int width;
 uniform int first_row;  // of the pool
@@ -28,6 +35,13 @@ void main() {
     behind *= behind;
 #if TAIL >= 0
     vec4 sums = texelFetch(tail_colour, xy, 0);
+#if TAIL == 4
+    if (sums.a > 0.0) {  // T_core P is what the whole list lets through, exp(-D)
+        float through = min(exp(-uintBitsToFloat(kept[WORDS * uint(p)])), light.a);
+        out_colour = vec4(light.rgb + (light.a - through) / sums.a * sums.rgb + through * behind, 1.0);
+        return;
+    }
+#else
     vec4 opacity = texelFetch(tail_opacity, xy, 0);
     if (opacity.z > 0.0) {
         vec3 average = sums.rgb / sums.a;
@@ -42,6 +56,7 @@ void main() {
         behind = (1.0 - through) * average + through * behind;
 #endif
     }
+#endif
 #endif
     out_colour = vec4(light.rgb + light.a * behind, 1.0);
 }

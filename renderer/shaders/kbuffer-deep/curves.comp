@@ -1,0 +1,21 @@
+#version 450
+// The bundle's network on the gathered sums of every open pixel, for the allocation within the frame: a and 1 / b of
+// log gain(k) = a - b (k-1). The list holds the pixels whose k is not settled by their count alone, so the cost is
+// linear in them; 1 / b is stored so that every later pass has the same number.
+layout(local_size_x = 64) in;
+#include "allocation/state.glsl"
+#include "kbuffer-deep/inputs.glsl"
+
+layout(std430, binding = 4) readonly buffer List { uint pixel[]; };
+layout(std430, binding = 5) writeonly buffer Curves { vec2 curve[]; };  // [P], a and 1 / b
+
+void main() {
+    uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    uint i = 64u * group + gl_LocalInvocationIndex;
+    if (i >= open_pixels) return;
+    uint p = pixel[i];
+    float x[DIAPHANE_FEATURES];
+    read_features(int(p), x);
+    vec2 gain = diaphane_predict(x).xy;
+    curve[p] = vec2(clamp(gain.x, -MOST_GAIN, MOST_GAIN), clamp(1.0 / gain.y, LEAST_RATE, MOST_RATE));
+}

@@ -1,0 +1,86 @@
+"""Depth bins on the GPU: what is kept of them, the features that a network reads of it, and the pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import moderngl
+import numpy as np
+import pytest
+from support.training import export_random, random_weights
+
+from labeller.curves import composite
+from renderer.features import FEATURES, SUMS, derive, gather
+from renderer.frame import Frame, front_bytes
+from renderer.techniques import KBufferDeep
+from renderer.techniques.base import Budget
+from schemas.colour import display8
+from schemas.fragments import FragmentDump
+from schemas.tail import DENSITY_BINS, SHARE_LEVELS, TailName
+
+BINNED = sorted(DENSITY_BINS)
+FRONT = SUMS.index("front_1")
+READ = ("log_n", "optical_depth", "rgb_nearest_g", *(name for name in FEATURES if name.startswith("front_")))
+
+
+@pytest.mark.parametrize("bins", DENSITY_BINS.values())
+@pytest.mark.parametrize("texels", [frozenset[int](), frozenset({1, 5}), frozenset(range(6))])
+def test_what_is_kept_of_the_bins_is_what_the_dump_says(
+    frame: Frame, dump: FragmentDump, bins: int, texels: frozenset[int]
+) -> None:
+    gathered = frame.gather("gather", texels, bins)
+    assert gathered.front is not None
+    words = np.frombuffer(gathered.front.read(), np.uint32)[: dump.pixels * front_bytes(bins) // 4]
+    words = words.reshape(dump.pixels, -1)
+    expected = gather(dump, bins)
+    np.testing.assert_allclose(
+        words[:, 0].view(np.float32), expected[:, SUMS.index("optical_depth")], rtol=1e-5, atol=1e-6
+    )
+    every = 16 // bins
+    for b in range(1, bins):
+        share = words[:, 1 + (b - 1) // 8] >> np.uint32(4 * ((b - 1) % 8)) & 15
+        np.testing.assert_array_equal(share, np.rint(SHARE_LEVELS * expected[:, FRONT - 1 + every * b]))
+
+
+@pytest.mark.parametrize("tail", BINNED)
+def test_a_network_reads_the_bins_and_the_picture_is_as_simulated(
+    frame: Frame, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, tail: TailName
+) -> None:
+    network = random_weights(11, READ)
+    sums = gather(dump, DENSITY_BINS[tail])
+    export_random(tmp_path, network, derive(sums)[dump.counts > 0], gl, tail)
+    deep = KBufferDeep(tmp_path)
+    pixels = np.flatnonzero(dump.counts > 1).astype(np.uint32)
+    np.testing.assert_allclose(
+        deep.features(frame, pixels), derive(sums)[pixels][:, network.columns], rtol=1e-5, atol=1e-5
+    )
+    for inference in ("glsl", "onnx"):
+        rendered = KBufferDeep(tmp_path, inference).render(frame, Budget(dump.total // 3, tail))
+        assert rendered.captured == dump.total // 3
+        simulated = composite(dump, rendered.k, tail).reshape(*rendered.linear.shape)
+        assert np.abs(display8(rendered.linear).astype(int) - display8(simulated).astype(int)).max() <= 1
+
+
+@pytest.mark.parametrize("tail", BINNED)
+def test_a_bundle_can_be_rendered_with_another_tail_than_its_own(
+    frame: Frame, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, tail: TailName
+) -> None:
+    features = derive(gather(dump, DENSITY_BINS[tail]))[dump.counts > 0]
+    export_random(tmp_path, random_weights(11, READ), features, gl, tail)
+    for other in ("density", "paper", *(b for b in BINNED if b != tail)):
+        rendered = KBufferDeep(tmp_path).render(frame, Budget(dump.total // 3, other))
+        simulated = composite(dump, rendered.k, other).reshape(*rendered.linear.shape)
+        assert np.abs(display8(rendered.linear).astype(int) - display8(simulated).astype(int)).max() <= 1
+
+
+@pytest.mark.parametrize("bins", DENSITY_BINS.values())
+def test_beside_bins_sums_are_half_floats(frame: Frame, dump: FragmentDump, bins: int) -> None:
+    gathered = frame.gather("gather", frozenset(range(6)), bins)
+    expected = gather(dump, bins)
+    for texel, texture in enumerate(gathered.sums):
+        assert texture.dtype == "f2"
+        found = np.frombuffer(texture.read(), np.float16).reshape(-1, 4)[:, :3].astype(np.float64)
+        truth = expected[:, 4 * texel : 4 * texel + 3]
+        # Each of the n additions, and what is added, is cut to 11 bits.
+        assert (np.abs(found - truth) <= (dump.counts[:, None] + 2) * np.abs(truth) * 2.0**-10 + 1e-6).all()
+    assert gathered.pass_bytes == 5 * 8 + 8 + 2 * bins + 4 + front_bytes(bins)

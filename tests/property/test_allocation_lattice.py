@@ -1,0 +1,140 @@
+"""The lattice form of lambda uses a budget exactly, whatever the curves, and is the float64 form but for ties."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from renderer.allocation.fill import feasible_k_min, solve_lambda
+from renderer.allocation.lattice import (
+    EDGES,
+    LAST,
+    MOST_FRAGMENTS,
+    MOST_GAIN,
+    ROUNDS,
+    Curves,
+    curves_of,
+    fragments_at,
+    price,
+    solve_on_lattice,
+)
+from renderer.screen import TURNS
+from schemas.bundle import GAIN_FLOOR
+
+pytestmark = pytest.mark.usefixtures("single_thread")
+
+counts = st.lists(st.one_of(st.integers(0, 6), st.sampled_from([0, 1, 4096])), min_size=1, max_size=12)
+gain = st.one_of(st.sampled_from([0.0, -5.0, -1e30, 1e30]), st.floats(-200.0, 200.0, width=32))
+decay = st.one_of(st.sampled_from([0.5, GAIN_FLOOR, 1e30]), st.floats(0.03125, 300.0, width=32))
+
+
+def drawn(data: st.DataObject, n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    a, b = (np.array([data.draw(each) for _ in n], dtype=np.float32) for each in (gain, decay))
+    return a, b
+
+
+def drawn_budget(data: st.DataObject, n: np.ndarray) -> int:
+    occupied, total = int(np.count_nonzero(n)), int(n.sum())
+    edges = {0, 1, max(occupied - 1, 0), occupied, max(total - 1, 0), total, 2 * total}
+    return data.draw(st.one_of(st.sampled_from(sorted(edges)), st.integers(0, total + 1)))
+
+
+@settings(max_examples=300)
+@given(counts, st.data())
+def test_a_budget_is_met_to_the_fragment(lists: list[int], data: st.DataObject) -> None:
+    n = np.array(lists)
+    curves, budget = curves_of(*drawn(data, n)), drawn_budget(data, n)
+    found = solve_on_lattice(curves, n, budget)
+    k, k_min = found.k, feasible_k_min(n, budget)
+    assert k.sum() == min(budget, n.sum())
+    assert (k >= np.minimum(n, k_min)).all()
+    if found.index is None:
+        assert np.array_equal(k, n)
+        return
+    # At its price it is within the budget, at the next one beyond it; what is left went there, by pixel index.
+    below, above = (fragments_at(price(found.index + step), curves, n, k_min) for step in (0, 1))
+    assert below.sum() <= budget < above.sum()
+    assert ((below <= k) & (k <= above)).all()
+    partly = np.flatnonzero(k < above)
+    grew = np.flatnonzero(k > below)
+    assert len(grew) == 0 or len(partly) == 0 or (grew <= partly.min()).all()
+
+
+@settings(max_examples=200)
+@given(counts, st.data(), st.integers(-LAST, LAST))
+def test_what_is_found_does_not_depend_on_the_start(lists: list[int], data: st.DataObject, start: int) -> None:
+    n = np.array(lists)
+    curves, budget = curves_of(*drawn(data, n)), drawn_budget(data, n)
+    cold = solve_on_lattice(curves, n, budget)
+    assert cold.rounds <= 4
+    starts = [start] if cold.index is None else [start, cold.index - 1000, cold.index + 1000, cold.index]
+    for each in starts:
+        warm = solve_on_lattice(curves, n, budget, max(min(each, LAST), -LAST))
+        assert np.array_equal(warm.k, cold.k)
+        assert warm.index == cold.index
+        assert warm.rounds <= ROUNDS
+        if cold.index is not None and abs(each - cold.index) <= 1000:
+            assert warm.rounds <= 2
+
+
+@settings(max_examples=200)
+@given(counts, st.data())
+def test_counts_are_those_of_float64_but_for_what_grows_between_two_prices(
+    lists: list[int], data: st.DataObject
+) -> None:
+    n = np.array(lists)
+    a = np.array([data.draw(st.floats(-30.0, 10.0, width=32)) for _ in lists], dtype=np.float32)
+    b = np.array([data.draw(st.floats(0.03125, 4.0, width=32)) for _ in lists], dtype=np.float32)
+    budget = drawn_budget(data, n)
+    found = solve_on_lattice(curves_of(a, b), n, budget)
+    expected, log_lambda = solve_lambda(a, b, n, budget, feasible_k_min(n, budget))
+    if found.index is None:
+        return
+    # A fragment that only one of the two gives comes at a price as close as rounding and the lattice are.
+    t = float(price(found.index))
+    near = 2.0 * (float(price(found.index + 1)) - t) + 4e-7 * (float(np.abs(a).max()) + abs(t) + float((n * b).max()))
+    for p in np.flatnonzero(found.k != expected):
+        k = np.arange(min(found.k[p], expected[p]) + 1, max(found.k[p], expected[p]) + 1)
+        assert (np.abs((k - 1.5) * b[p].astype(np.float64) - a[p] + log_lambda) <= near).all()
+
+
+@given(st.integers(-LAST, LAST - 1), gain, decay, st.integers(0, MOST_FRAGMENTS))
+def test_counts_do_not_fall_with_the_price(index: int, a: float, b: float, n: int) -> None:
+    curves, most = curves_of(np.array([a]), np.array([b])), np.array([n])
+    assert price(index) < price(index + 1)
+    assert fragments_at(price(index), curves, most, 0) <= fragments_at(price(index + 1), curves, most, 0)
+
+
+@pytest.mark.parametrize("a", [-MOST_GAIN, 0.0, MOST_GAIN])
+@pytest.mark.parametrize("b", [1e-30, GAIN_FLOOR, 1.0, 3e38])
+def test_the_ends_of_the_lattice_give_all_and_as_few_as_may_be(a: float, b: float) -> None:
+    curves, n = curves_of(np.array([a]), np.array([b])), np.array([MOST_FRAGMENTS])
+    assert np.isfinite(curves.rate).all()
+    assert fragments_at(price(LAST), curves, n, 1) == MOST_FRAGMENTS
+    assert fragments_at(price(-LAST), curves, n, 1) == 1
+
+
+def test_equal_curves_share_by_index() -> None:
+    n = np.full(10_000, 9)
+    curves = curves_of(np.full(len(n), -8.0), np.full(len(n), 0.5))
+    found = solve_on_lattice(curves, n, 34_567)
+    assert found.k.sum() == 34_567
+    assert set(np.unique(found.k)) == {3, 4}
+    assert (np.diff(found.k) <= 0).all()
+
+
+def test_the_error_of_the_prices_is_small_against_any_curve_that_matters() -> None:
+    steps = [float(price(i + 1)) - float(price(i)) for i in range(-200_000, 200_000, 37)]
+    values = [abs(float(price(i))) for i in range(-200_000, 200_000, 37)]
+    assert (np.array(steps) <= 2.0**-13 * (1.0 + np.array(values))).all()
+    assert max(values) > 4000.0
+    assert EDGES * EDGES / 2 * 2.0**-14 >= 0.1, "a warm start reaches a tenth of a log unit around any price"
+
+
+def test_fragments_beyond_those_a_shader_can_visit_get_no_slots() -> None:
+    assert MOST_FRAGMENTS == TURNS
+    n = np.array([MOST_FRAGMENTS + 5, 3])
+    found = solve_on_lattice(Curves(np.zeros(2, np.float32), np.ones(2, np.float32)), n, 10**9)
+    assert found.k.tolist() == [MOST_FRAGMENTS, 3]
