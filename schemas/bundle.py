@@ -10,22 +10,74 @@ import hashlib
 import math
 from itertools import pairwise
 from pathlib import Path
-from typing import Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError, model_validator
 
 from schemas.problem import ExitCode, Problem
 from schemas.tail import MetricName, TailName
 
-FORMAT: Final = "diaphane-bundle/1"
+FormatName = Literal["diaphane-bundle/1", "diaphane-bundle/2"]
+FORMAT: Final = "diaphane-bundle/2"
 MANIFEST: Final = "manifest.json"
 WEIGHTS: Final = "weights.safetensors"
 ONNX: Final = "model.onnx"
 GLSL: Final = "predict.glsl"
-FILES: Final = (WEIGHTS, ONNX, GLSL)
+GLSL_HALF: Final = "predict_half.glsl"
+UBO: Final = "predict_ubo.glsl"
+UBO_DATA: Final = "predict_ubo.bin"
+UBO_HALF: Final = "predict_ubo_half.glsl"
+UBO_HALF_DATA: Final = "predict_ubo_half.bin"
+WGSL: Final = "predict.wgsl"
+WGSL_HALF: Final = "predict_half.wgsl"
+HLSL: Final = "predict.hlsl"
+
+HALF_FILES: Final = (GLSL_HALF, UBO_HALF, UBO_HALF_DATA, WGSL_HALF)
+"""The forms in float16: all of them, or none where the network does not bear that precision."""
+
+SHADERS: Final = (GLSL, UBO, WGSL, HLSL, GLSL_HALF, UBO_HALF, WGSL_HALF)
+"""The files that are source of a shader."""
+
+FILES: Final = (WEIGHTS, ONNX, GLSL, UBO, UBO_DATA, WGSL, HLSL, *HALF_FILES)
+"""What a bundle holds beside its manifest."""
+
+_FIRST_FILES: Final = (WEIGHTS, ONNX, GLSL)
+"""What one of the format `diaphane-bundle/1` holds."""
 
 GAIN_FLOOR: Final = 0.02
 """`b = softplus(.) + GAIN_FLOOR`: log gain lost per fragment is at least this, so that 1 / b stays finite."""
+
+G_MAX: Final = 2.0
+"""`g = G_MAX sigmoid(.)`: the steepest density tail that a network may ask for."""
+
+HeadName = Literal["gain-curve", "importance"]
+OutputName = Literal["a", "b", "g", "importance"]
+
+HEADS: Final[dict[HeadName, tuple[tuple[OutputName, ...], ...]]] = {
+    "gain-curve": (("a", "b"), ("a", "b", "g")),
+    "importance": (("importance",),),
+}
+"""What a network of each head may answer; the first is meant where a manifest does not say.
+
+`a`, `b`: the log gain of core fragment k is `a - b (k - 1)`. `g`: the density tail's constant of the pixel.
+`importance`: DHOIT's share of a pixel, which Eq. 3 turns into k.
+"""
+
+
+class Activation(NamedTuple):
+    """What makes an output of the last layer's number: `scale * function(x) + offset`."""
+
+    function: Literal["identity", "softplus", "sigmoid"]
+    scale: float
+    offset: float
+
+
+ACTIVATIONS: Final[dict[OutputName, Activation]] = {
+    "a": Activation("identity", 1.0, 0.0),
+    "b": Activation("softplus", 1.0, GAIN_FLOOR),
+    "g": Activation("sigmoid", G_MAX, 0.0),
+    "importance": Activation("sigmoid", 1.0, 0.0),
+}
 
 FEATURE_LIMIT: Final = 4.0
 """Normalised features are clamped to this, either way: beyond it no training data says what a network would answer."""
@@ -75,13 +127,22 @@ class FileSpec(BaseModel):
 
 
 class ParityReport(BaseModel):
-    """Largest differences between the forms of the network, relative to max(1, |value|), on real inputs.
+    """Largest differences between torch and the other forms of the network on real inputs.
+
+    All are relative to max(1, |value|), but `float16`.
 
     Attributes:
         count: Rows of features compared.
-        tolerance: What was allowed.
+        tolerance: What was allowed in float32.
         torch_onnx: torch against onnxruntime.
         torch_glsl: torch against `predict.glsl` run by the driver below.
+        torch_ubo: torch against `predict_ubo.glsl`; None in bundles of the first format.
+        half_tolerance: What was allowed with weights in float16 and arithmetic in float32.
+        half: The files of which that is true, run by the driver below -> difference.
+        float16: With hidden layers computed in float16 too, every product and sum rounded. Relative to the scale of the
+            output, the largest |value| that it takes on these inputs, or 1: float16 has 11 bits, and the terms whose
+            sum is a small value are of that scale. None where it was not measured.
+        float16_tolerance: What was allowed of that.
         driver: GL renderer and version.
     """
 
@@ -91,7 +152,56 @@ class ParityReport(BaseModel):
     tolerance: float = Field(gt=0.0)
     torch_onnx: float = Field(ge=0.0)
     torch_glsl: float = Field(ge=0.0)
+    torch_ubo: float | None = Field(default=None, ge=0.0)
+    half_tolerance: float = Field(default=2e-3, gt=0.0)
+    half: dict[str, float] = {}
+    float16: float | None = None
+    float16_tolerance: float = Field(default=1e-2, gt=0.0)
     driver: str
+
+    @property
+    def worst(self) -> float:
+        """The largest difference in float32."""
+        return max(self.torch_onnx, self.torch_glsl, self.torch_ubo or 0.0)
+
+    @property
+    def half_holds(self) -> bool:
+        """Whether the network bears float16: a bundle has its files in it only then."""
+        stored = max(self.half.values(), default=0.0)
+        return stored <= self.half_tolerance and (self.float16 or 0.0) <= self.float16_tolerance
+
+
+class SelfTest(BaseModel):
+    """Rows with which anyone can check what their compiler made of a form.
+
+    Attributes:
+        features: [R][F], real inputs of the network.
+        outputs: [R][outputs], the answers, from float64.
+        sums: [S][4 * texels], raw sums of pixels (`renderer.features.SUMS`).
+        derived: [S][F], their features, from the same expressions.
+        tolerance: File -> largest difference of an output, relative to `output_scale`.
+        feature_tolerance: Largest difference of a feature, relative to max(1, |value|).
+        output_scale: [outputs], the largest |value| of each on the inputs that parity was measured on, at least 1.
+    """
+
+    model_config = _STRICT
+
+    features: tuple[tuple[float, ...], ...]
+    outputs: tuple[tuple[float, ...], ...]
+    sums: tuple[tuple[float, ...], ...]
+    derived: tuple[tuple[float, ...], ...]
+    tolerance: dict[str, float]
+    feature_tolerance: float = Field(gt=0.0)
+    output_scale: tuple[float, ...]
+
+
+class OnnxSpec(BaseModel):
+    """What `model.onnx` needs: operator set and version of the file format."""
+
+    model_config = _STRICT
+
+    opset: int = Field(gt=0)
+    ir_version: int = Field(gt=0)
 
 
 class Provenance(BaseModel):
@@ -122,7 +232,8 @@ class Manifest(BaseModel):
     Attributes:
         format: Version of this schema.
         name: Name of the bundle.
-        head: How the outputs are read; `gain-curve` gives (a, b).
+        head: How the outputs are read.
+        outputs: What the network answers, in this order; one of `HEADS[head]`.
         features: Inputs of the network, in order.
         hidden: Units of each hidden layer (ReLU).
         layers: Tensors of `weights.safetensors`.
@@ -130,6 +241,8 @@ class Manifest(BaseModel):
         metric: Where the error was measured.
         k_min: Fewest core fragments of an occupied pixel where the budget covers that, else 0.
         files: File name -> size and hash.
+        onnx: What `model.onnx` needs; None in the first format.
+        self_test: Rows to check a compiled form with; None in the first format.
         parity: Agreement of torch, ONNX and GLSL.
         provenance: Where it comes from.
         evaluation: What was measured on held-out scenes.
@@ -137,9 +250,10 @@ class Manifest(BaseModel):
 
     model_config = _STRICT
 
-    format: Literal["diaphane-bundle/1"] = FORMAT
+    format: FormatName = FORMAT
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
-    head: Literal["gain-curve"] = "gain-curve"
+    head: HeadName = "gain-curve"
+    outputs: tuple[OutputName, ...]
     features: tuple[FeatureSpec, ...] = Field(min_length=1, max_length=256)
     hidden: tuple[int, ...] = Field(max_length=8)
     layers: tuple[LayerSpec, ...]
@@ -147,24 +261,38 @@ class Manifest(BaseModel):
     metric: MetricName
     k_min: int = Field(ge=0, le=1)
     files: dict[str, FileSpec]
+    onnx: OnnxSpec | None = None
+    self_test: SelfTest | None = None
     parity: ParityReport
     provenance: Provenance
     evaluation: dict[str, JsonValue]
 
-    @field_validator("files")
+    @model_validator(mode="before")
     @classmethod
-    def _exactly_our_files(cls, files: dict[str, FileSpec]) -> dict[str, FileSpec]:
-        if set(files) != set(FILES):
-            raise ValueError(f"the files must be {', '.join(FILES)}")
-        return files
+    def _usual_outputs(cls, fields: Any) -> Any:
+        if isinstance(fields, dict) and "outputs" not in fields:
+            choices = HEADS.get(fields.get("head", "gain-curve"), ((),))
+            return {**fields, "outputs": choices[0]}
+        return fields
+
+    @model_validator(mode="after")
+    def _exactly_our_files(self) -> Manifest:
+        allowed = (_FIRST_FILES,) if self.format == "diaphane-bundle/1" else (FILES, FILES[: -len(HALF_FILES)])
+        if set(self.files) not in map(set, allowed):
+            raise ValueError(f"the files must be {', '.join(allowed[0])}")
+        if self.format != "diaphane-bundle/1" and (self.onnx is None or self.self_test is None):
+            raise ValueError("onnx or self_test is missing")
+        return self
 
     @model_validator(mode="after")
     def _layers_fit(self) -> Manifest:
         names = self.feature_names
         if len(set(names)) != len(names):
             raise ValueError("a feature is listed twice")
-        if self.layers != layer_specs(len(names), self.hidden):
-            raise ValueError("the layers do not follow from the features and the hidden units")
+        if self.outputs not in HEADS[self.head]:
+            raise ValueError(f"a network of the head {self.head} does not answer {', '.join(self.outputs)}")
+        if self.layers != layer_specs(len(names), self.hidden, len(self.outputs)):
+            raise ValueError("the layers do not follow from the features, the hidden units and the outputs")
         return self
 
     @property
@@ -178,9 +306,9 @@ class Manifest(BaseModel):
         return sum(math.prod(layer.shape) for layer in self.layers)
 
 
-def layer_specs(inputs: int, hidden: tuple[int, ...]) -> tuple[LayerSpec, ...]:
-    """Tensors of a gain-curve network with `inputs` features and the given hidden units; it has 2 outputs."""
-    sizes = (inputs, *hidden, 2)
+def layer_specs(inputs: int, hidden: tuple[int, ...], outputs: int = 2) -> tuple[LayerSpec, ...]:
+    """Tensors of a network with `inputs` features, the given hidden units and `outputs` numbers in its answer."""
+    sizes = (inputs, *hidden, outputs)
     specs: list[LayerSpec] = []
     for i, (fan_in, fan_out) in enumerate(pairwise(sizes)):
         specs.append(LayerSpec(name=f"layer{i}.weight", shape=(fan_out, fan_in), layout="out,in"))

@@ -7,7 +7,8 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
 from schemas.limits import LIMITS
-from schemas.tail import DENSITY_G, TailName
+from schemas.network import DEFAULT_NETWORK, NetworkSize
+from schemas.tail import DEFAULT_TAIL, DENSITY_G, TailName
 from schemas.view import ListedView
 
 JobKind = Literal["build", "render", "label", "train", "evaluate"]
@@ -71,6 +72,7 @@ class JobSpec(BaseModel):
         height: Rows.
         tail: How the fragments beyond k are averaged.
         g: Steepness of the density tail.
+        network: How much the network reads and computes a pixel.
         seed: Seed of everything drawn at random.
         steps: Optimiser steps; None: the trainer's default.
         start_from: Weights that the training begins with: drawn by the seed, or those of the name's champion.
@@ -93,8 +95,9 @@ class JobSpec(BaseModel):
     views_per_scene: int = Field(default=3, ge=1, le=LIMITS.views)
     width: int = Field(default=1430, ge=LIMITS.min_side, le=LIMITS.max_side)
     height: int = Field(default=960, ge=LIMITS.min_side, le=LIMITS.max_side)
-    tail: TailName = "density"
+    tail: TailName = DEFAULT_TAIL
     g: float = Field(default=DENSITY_G, ge=0.0, le=10.0)
+    network: NetworkSize = DEFAULT_NETWORK
     seed: int = Field(default=0, ge=0, le=2**31 - 1)
     steps: Annotated[int, Field(ge=1, le=LIMITS.steps)] | None = None
     start_from: Literal["scratch", "champion"] = "scratch"

@@ -17,12 +17,12 @@ from safetensors.numpy import load, save
 from renderer.features import FEATURES
 from schemas.bundle import (
     FILES,
-    GLSL,
+    HALF_FILES,
     MANIFEST,
-    ONNX,
     WEIGHTS,
     FeatureSpec,
     Manifest,
+    OnnxSpec,
     ParityReport,
     Provenance,
     TailSpec,
@@ -32,8 +32,10 @@ from schemas.bundle import (
 )
 from schemas.problem import ExitCode, Problem
 from schemas.tail import MetricName
-from trainer.export_glsl import glsl_source
-from trainer.export_onnx import onnx_model
+from trainer.export_forms import float_forms, half_forms
+from trainer.export_onnx import IR_VERSION, OPSET
+from trainer.prune import pruned
+from trainer.self_test import self_test
 from trainer.weights import Weights
 
 
@@ -82,9 +84,9 @@ def export_bundle(
 
     Args:
         folder: Empty or not yet there.
-        weights: The trained network.
+        weights: The trained network; what it does not use is left out.
         description: What the manifest says beside it.
-        features: float32 [R, 26], real inputs on which torch, ONNX and GLSL must agree; 1e5 rows or all there are.
+        features: float32 [R, C], real inputs on which torch, ONNX and GLSL must agree; 1e5 rows or all there are.
         ctx: The GL context that runs the GLSL form.
 
     Raises:
@@ -92,11 +94,16 @@ def export_bundle(
     """
     from trainer.parity import check  # torch and onnxruntime take seconds to import; reading a bundle needs neither
 
-    return write_bundle(folder, weights, description, lambda: check(weights, folder, features, ctx))
+    weights = pruned(weights)
+    return write_bundle(folder, weights, description, features, lambda: check(weights, folder, features, ctx))
 
 
 def write_bundle(
-    folder: Path, weights: Weights, description: Description, compared: Callable[[], ParityReport]
+    folder: Path,
+    weights: Weights,
+    description: Description,
+    features: NDArray[np.float32],
+    compared: Callable[[], ParityReport],
 ) -> Manifest:
     """Write a bundle's files; the manifest comes last.
 
@@ -104,17 +111,25 @@ def write_bundle(
         folder: Empty or not yet there.
         weights: The network.
         description: What the manifest says beside it.
+        features: float32 [R, C], real inputs; the rows of the self-test are among them.
         compared: Says how far the forms differ; called when they are in the folder.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    specs = layer_specs(len(weights.features), weights.hidden)
+    specs = layer_specs(len(weights.features), weights.hidden, len(weights.outputs))
     arrays = [array for layer in weights.layers for array in layer]
     tensors = {spec.name: np.ascontiguousarray(array) for spec, array in zip(specs, arrays, strict=True)}
-    _write(folder / WEIGHTS, save(tensors, metadata={"head": "gain-curve"}))
-    _write(folder / ONNX, onnx_model(weights))
-    _write(folder / GLSL, glsl_source(weights).encode())
+    _write(folder / WEIGHTS, save(tensors, metadata={"head": weights.head}))
+    for name, content in {**float_forms(weights), **_half_forms(weights)}.items():
+        _write(folder / name, content)
+    parity = compared()
+    if not parity.half_holds:
+        for name in HALF_FILES:
+            (folder / name).unlink()
+    files = {name: file_spec(folder / name) for name in FILES if (folder / name).is_file()}
     manifest = Manifest(
         name=description.name,
+        head=weights.head,
+        outputs=weights.outputs,
         features=tuple(
             FeatureSpec(name=name, mean=float(mean), std=float(std))
             for name, mean, std in zip(weights.features, weights.mean, weights.std, strict=True)
@@ -124,8 +139,10 @@ def write_bundle(
         tail=description.tail,
         metric=description.metric,
         k_min=description.k_min,
-        files={name: file_spec(folder / name) for name in FILES},
-        parity=compared(),
+        files=files,
+        onnx=OnnxSpec(opset=OPSET, ir_version=IR_VERSION),
+        self_test=self_test(weights, features, files),
+        parity=parity,
         provenance=description.provenance,
         evaluation=description.evaluation,
     )
@@ -156,7 +173,14 @@ def load_bundle(folder: Path) -> Bundle:
     layers = tuple((tensors[f"layer{i}.weight"], tensors[f"layer{i}.bias"]) for i in range(len(manifest.hidden) + 1))
     mean = np.array([feature.mean for feature in manifest.features], dtype=np.float32)
     std = np.array([feature.std for feature in manifest.features], dtype=np.float32)
-    return Bundle(manifest, Weights(manifest.feature_names, mean, std, layers))
+    return Bundle(manifest, Weights(manifest.feature_names, mean, std, layers, manifest.head, manifest.outputs))
+
+
+def _half_forms(weights: Weights) -> dict[str, bytes]:
+    try:
+        return half_forms(weights)
+    except ValueError:  # too large for float16: `float_forms` has refused what is not finite
+        return {}
 
 
 def _write(path: Path, content: bytes) -> None:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from labeller.dataset import read_ahead
+from labeller.shard_file import BLOCK_ROWS
 from labeller.shards import Shard, read_shard
 from schemas.problem import ExitCode, Problem
 
@@ -34,6 +35,27 @@ LOSSLESS_MSE: Final = 1e-7
 NEGLIGIBLE: Final = 0.1
 """Share of the lossless error below which the optimum's error is not worth a lower price."""
 
+AnyView = TypeVar("AnyView")
+
+
+@dataclass(frozen=True)
+class PaperInputs:
+    """What DHOIT's network reads beside the colours (METHOD.md section 4), and the budgets of its labels.
+
+    Attributes:
+        depth: float32 [R, 2], window depth of the nearest and of the farthest fragment.
+        scene_depth: The same of the whole view.
+        fragments: N, fragments of the view.
+        pixels: Pixels of the view.
+        budgets: F of each of the view's `anchors`.
+    """
+
+    depth: NDArray[np.float32]
+    scene_depth: tuple[float, float]
+    fragments: int
+    pixels: int
+    budgets: tuple[int, ...]
+
 
 @dataclass(frozen=True)
 class ViewData:
@@ -41,7 +63,7 @@ class ViewData:
 
     Attributes:
         asset: What the view shows; assets are weighted equally.
-        features: float32 [R, 26], columns `renderer.features.FEATURES`.
+        features: float32 [R, C], columns `renderer.features.FEATURES`.
         n: float32 [R], fragments.
         k_min: Fewest core fragments.
         offsets: int64 [R+1], segments of row r are `offsets[r]:offsets[r+1]`.
@@ -53,6 +75,7 @@ class ViewData:
         scale_grid: float64 [G], mean over the rows of `(E* + lossless) / lambda` at those prices: the scale of the
             regret, E* the optimum's error.
         sampled_pixels: Pixels of the image that the rows stand for.
+        paper: Inputs of the `paper` presets, where they are known (`trainer.paper.with_paper_inputs`).
     """
 
     asset: str
@@ -67,6 +90,7 @@ class ViewData:
     price_grid: NDArray[np.float64]
     scale_grid: NDArray[np.float64]
     sampled_pixels: float
+    paper: PaperInputs | None = None
 
     @property
     def rows(self) -> int:
@@ -77,7 +101,17 @@ class ViewData:
         """At most `rows` rows, drawn by `seed`; prices and scale stay those of the whole."""
         if self.rows <= rows:
             return self
-        chosen = np.sort(np.random.default_rng(seed).choice(self.rows, size=rows, replace=False))
+        return self.part(np.sort(np.random.default_rng(seed).choice(self.rows, size=rows, replace=False)))
+
+    def blocks(self, chosen: NDArray[np.int64] | None) -> ViewData:
+        """Some blocks of `BLOCK_ROWS` rows, by rising number; None: all rows."""
+        if chosen is None:
+            return self
+        rows = (chosen[:, None] * BLOCK_ROWS + np.arange(BLOCK_ROWS)).ravel()
+        return self.part(rows[rows < self.rows])
+
+    def part(self, chosen: NDArray[np.int64]) -> ViewData:
+        """Some rows, by rising index; prices and scale stay those of the whole."""
         starts, counts = self.offsets[chosen], np.diff(self.offsets)[chosen]
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         segments = np.arange(offsets[-1]) + np.repeat(starts - offsets[:-1], counts)
@@ -88,15 +122,44 @@ class ViewData:
             offsets=offsets,
             slopes=self.slopes[segments],
             lengths=self.lengths[segments],
-            sampled_pixels=self.sampled_pixels * rows / self.rows,
+            sampled_pixels=self.sampled_pixels * len(chosen) / max(1, self.rows),
+            paper=self.paper and replace(self.paper, depth=self.paper.depth[chosen]),
         )
+
+    def moments(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Means of the features and of their squares, float64 [C] each."""
+        return moments(self.features)
 
     def digest(self) -> bytes:
         """sha256 over what is trained on."""
         hasher = hashlib.sha256(self.asset.encode())
-        for array in (self.features, self.n, self.offsets, self.slopes, self.lengths, self.anchors):
+        arrays = [self.features, self.n, self.offsets, self.slopes, self.lengths, self.anchors]
+        for array in arrays + ([self.paper.depth] if self.paper is not None else []):
             hasher.update(np.ascontiguousarray(array).tobytes())
         return hasher.digest()
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """How rows are drawn from a data set.
+
+    Attributes:
+        replay: Views of another data set, so that what was learned from them is not forgotten.
+        replay_share: How often a group is one of theirs.
+        hardness: Of each view, >= 0: how much there is still to learn; empty: not known.
+        mining: How often a view is drawn in proportion to its hardness.
+        noise: float32 [F], standard deviation of what is added to the features; empty: nothing.
+        rank: Of the process that draws, 0..size-1: it gets every `size`-th group of the same batch.
+        size: Processes that share a batch.
+    """
+
+    replay: Sequence[ViewData] = ()
+    replay_share: float = 0.5
+    hardness: Sequence[float] = ()
+    mining: float = 0.0
+    noise: NDArray[np.float32] = field(default_factory=lambda: np.zeros(0, np.float32))
+    rank: int = 0
+    size: int = 1
 
 
 @dataclass(frozen=True)
@@ -111,6 +174,7 @@ class Batch:
         lengths: float32 [B, SEGMENTS], 0 where a hull has ended.
         log_lambda: float32 [B], one price per group.
         scale: float32 [G], mean of `(E* + lossless) / lambda` of each group's view at its price.
+        share: Of the whole batch that these rows are: 1 for a process alone.
     """
 
     features: NDArray[np.float32]
@@ -120,6 +184,7 @@ class Batch:
     lengths: NDArray[np.float32]
     log_lambda: NDArray[np.float32]
     scale: NDArray[np.float32]
+    share: float
 
 
 def lossless_error(pixels: float) -> float:
@@ -140,7 +205,15 @@ def load_shards(paths: Sequence[Path], assets: Sequence[str], threads: int | Non
     """
     shards = zip(paths, assets, strict=True)
     read = read_ahead(lambda item: view_data(read_shard(item[0]), item[1]), shards, threads)
-    views = [view for view in read if view.rows]
+    return refuse_empty([view for view in read if view.rows])
+
+
+def refuse_empty(views: list[AnyView]) -> list[AnyView]:
+    """The views with rows, unless there are none.
+
+    Raises:
+        Problem: There are none.
+    """
     if not views:
         raise Problem(
             "There is nothing to learn: no pixel's colour depends on the budget.",
@@ -179,7 +252,7 @@ def make_view(
 
     Args:
         asset: What the view shows.
-        features: float32 [R, 26].
+        features: float32 [R, C].
         n: int32 [R], fragments.
         k_min: Fewest core fragments.
         hull: Offsets int64 [R+1], k int32 [M] and error float32 [M] of the hulls' vertices.
@@ -214,7 +287,13 @@ def make_view(
     )
 
 
-def sample_batch(views: Sequence[ViewData], columns: Sequence[int], seed: tuple[int, int], size: int) -> Batch:
+def sample_batch(
+    views: Sequence[ViewData],
+    columns: Sequence[int],
+    seed: tuple[int, int],
+    size: int,
+    drawing: Drawing | None = None,
+) -> Batch:
     """A batch, the same for the same seed.
 
     Each group comes from one view (every asset equally often, then every view of it) and has one price: half of
@@ -225,41 +304,88 @@ def sample_batch(views: Sequence[ViewData], columns: Sequence[int], seed: tuple[
         columns: Columns of the features that the model reads.
         seed: Seed of the training and number of the step.
         size: Rows; rounded down to whole groups of `GROUP`.
+        drawing: How rows are drawn; None: as above, and all of them.
     """
-    rng = np.random.default_rng(seed)
-    by_asset = _views_by_asset(views)
-    groups = max(1, size // GROUP)
+    how = drawing or Drawing()
+    total = max(1, size // GROUP)
+    groups = len(range(how.rank, total, how.size))
     features = np.empty((groups * GROUP, len(columns)), dtype=np.float32)
     n, k_min, log_lambda = (np.empty(groups * GROUP, dtype=np.float32) for _ in range(3))
     slopes, lengths = (np.zeros((groups * GROUP, SEGMENTS), dtype=np.float32) for _ in range(2))
     scale = np.empty(groups, dtype=np.float32)
-    for g in range(groups):
-        same = by_asset[rng.integers(len(by_asset))]
-        view = same[rng.integers(len(same))]
+    for g, view, rng in draw_views(views, seed, total, how):
         rows = rng.integers(view.rows, size=GROUP)
         price = _draw_price(view, rng)
-        part = slice(g * GROUP, (g + 1) * GROUP)
+        if g % how.size != how.rank:
+            continue
+        own = g // how.size
+        part = slice(own * GROUP, (own + 1) * GROUP)
         features[part] = view.features[rows][:, columns]
+        if len(how.noise):
+            noise = np.random.default_rng((*seed, g)).standard_normal((GROUP, len(columns)), dtype=np.float32)
+            features[part] += how.noise * noise
         n[part], k_min[part], log_lambda[part] = view.n[rows], view.k_min, price
         _pad(view.offsets, view.slopes, view.lengths, rows, slopes[part], lengths[part])
-        scale[g] = np.exp(np.interp(price, view.price_grid, np.log(view.scale_grid)))
-    return Batch(features, n, k_min, slopes, lengths, log_lambda, scale)
+        scale[own] = np.exp(np.interp(price, view.price_grid, np.log(view.scale_grid)))
+    return Batch(features, n, k_min, slopes, lengths, log_lambda, scale, groups / total)
 
 
-def normalisation(views: Sequence[ViewData]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Mean and spread of every feature, float32 [26] each; every asset weighs the same, so do its views."""
+def draw_views(
+    views: Sequence[ViewData], seed: tuple[int, int], groups: int, drawing: Drawing
+) -> Iterator[tuple[int, ViewData, np.random.Generator]]:
+    """The view of each group of a batch, and what its rows are drawn with, by every process in the same way.
+
+    Args:
+        views: The data set.
+        seed: Seed of the training and number of the step.
+        groups: How many.
+        drawing: How views are drawn.
+    """
+    rng = np.random.default_rng(seed)
+    by_asset, replayed = _views_by_asset(views), _views_by_asset(drawing.replay)
+    hardness = np.cumsum(drawing.hardness)
+    for g in range(groups):
+        if replayed and rng.random() < drawing.replay_share:
+            yield g, _draw_view(replayed, rng), rng
+        elif drawing.mining and len(hardness) and hardness[-1] > 0.0 and rng.random() < drawing.mining:
+            place = np.searchsorted(hardness, rng.random() * hardness[-1], side="right")
+            yield g, views[min(int(place), len(views) - 1)], rng
+        else:
+            yield g, _draw_view(by_asset, rng), rng
+
+
+def normalisation(
+    assets: Sequence[str], statistics: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Mean and spread of every feature, float32 [C] each; every asset weighs the same, so do its views.
+
+    Args:
+        assets: Of each view.
+        statistics: `moments` of each view.
+    """
     means, squares = [], []
-    for same in _views_by_asset(views):
-        means.append(np.mean([view.features.mean(axis=0, dtype=np.float64) for view in same], axis=0))
-        squares.append(np.mean([np.square(view.features, dtype=np.float64).mean(axis=0) for view in same], axis=0))
+    for name in sorted(set(assets)):
+        same = [found for asset, found in zip(assets, statistics, strict=True) if asset == name]
+        means.append(np.mean([mean for mean, _ in same], axis=0))
+        squares.append(np.mean([square for _, square in same], axis=0))
     mean = np.mean(means, axis=0)
     variance = np.maximum(np.mean(squares, axis=0) - mean * mean, 0.0)
     return mean.astype(np.float32), np.sqrt(variance).astype(np.float32)
 
 
+def moments(features: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Means of the columns of float32 [R, C] and of their squares, float64 [C] each."""
+    return features.mean(axis=0, dtype=np.float64), np.square(features, dtype=np.float64).mean(axis=0)
+
+
 def _views_by_asset(views: Sequence[ViewData]) -> list[list[ViewData]]:
     names = sorted({view.asset for view in views})
     return [[view for view in views if view.asset == name] for name in names]
+
+
+def _draw_view(by_asset: Sequence[Sequence[ViewData]], rng: np.random.Generator) -> ViewData:
+    same = by_asset[int(rng.integers(len(by_asset)))]
+    return same[int(rng.integers(len(same)))]
 
 
 def _draw_price(view: ViewData, rng: np.random.Generator) -> float:

@@ -6,8 +6,9 @@ of the hulls, so `1` is the best that any allocation could do.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numba
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from renderer.allocation.fill import solve_lambda
 from trainer.dataset import ViewData, lossless_error
+from trainer.paper import Fill, importance_counts
 from trainer.weights import Weights
 
 
@@ -39,29 +41,52 @@ class BudgetScore:
     ratio: float
 
 
-def evaluate_view(weights: Weights, view: ViewData, log_lambdas: Sequence[float]) -> list[BudgetScore]:
+Allocate = Callable[[int, int], NDArray[np.int32]]
+"""Counts of a view's rows, from the number of the price and the fragments that the rows may have."""
+
+
+def evaluate_view(
+    weights: Weights, view: ViewData, log_lambdas: Sequence[float], fill: Fill = "budget"
+) -> list[BudgetScore]:
     """Compare a predictor with the optimum at the budgets that some prices stand for.
 
     Args:
         weights: The predictor.
         view: Rows of a view.
-        log_lambdas: Natural logarithms of the prices, for example `view.anchors`.
+        log_lambdas: Natural logarithms of the prices, for example `view.anchors`; those for an `importance` network.
+        fill: From importances to counts.
     """
-    a, b = weights.predict(view.features)
-    n = view.n.astype(np.int32)
+    allocate = _allocation(weights, view, fill)
+    return [
+        score_allocation(view, float(log_lambda), partial(allocate, level))
+        for level, log_lambda in enumerate(log_lambdas)
+    ]
+
+
+def score_allocation(view: ViewData, log_lambda: float, allocate: Callable[[int], NDArray[np.int32]]) -> BudgetScore:
+    """Compare any allocation with the optimum at the budget that a price stands for.
+
+    Args:
+        view: Rows of a view.
+        log_lambda: Natural logarithm of the price.
+        allocate: Counts of the rows, int32 [R], from the fragments that they may have.
+    """
+    budget, optimum = _optimum(view.offsets, view.slopes, view.lengths, view.k_min, float(np.exp(log_lambda)))
+    error = _hull_error(view.offsets, view.slopes, view.lengths, view.k_min, allocate(budget))
     floor = lossless_error(view.sampled_pixels)
-    scores = []
-    for log_lambda in log_lambdas:
-        budget, optimum = _optimum(view.offsets, view.slopes, view.lengths, view.k_min, float(np.exp(log_lambda)))
-        k, _ = solve_lambda(a, b, n, budget, view.k_min)
-        error = _hull_error(view.offsets, view.slopes, view.lengths, view.k_min, k)
-        ratio = (error + floor) / (optimum + floor)
-        scores.append(BudgetScore(view.asset, float(log_lambda), budget, error, optimum, ratio))
-    return scores
+    return BudgetScore(view.asset, log_lambda, budget, error, optimum, (error + floor) / (optimum + floor))
 
 
-def evaluate(weights: Weights, views: Iterable[ViewData]) -> list[BudgetScore]:
-    """Every view at its scored budgets, or in the middle of its price range where it has none."""
+def evaluate(weights: Weights, views: Iterable[ViewData], fill: Fill = "budget") -> list[BudgetScore]:
+    """Every view at its scored budgets; without any, a gain-curve network is scored in the middle of its prices.
+
+    Args:
+        weights: The predictor.
+        views: Rows of views.
+        fill: From the importances of such a network to counts.
+    """
+    if weights.head == "importance":
+        return [score for view in views for score in evaluate_view(weights, view, list(view.anchors), fill)]
     return [score for view in views for score in evaluate_view(weights, view, scored_prices(view))]
 
 
@@ -73,6 +98,14 @@ def geometric_mean(scores: Sequence[BudgetScore]) -> float:
 def scored_prices(view: ViewData) -> list[float]:
     """Log prices at which a view is scored."""
     return [float(price) for price in view.anchors] or [0.5 * sum(view.price_range)]
+
+
+def _allocation(weights: Weights, view: ViewData, fill: Fill) -> Allocate:
+    if weights.head == "importance":
+        return lambda level, budget: importance_counts(weights, view, level, budget, fill)
+    a, b = weights.predict(view.features)
+    n = view.n.astype(np.int32)
+    return lambda level, budget: solve_lambda(a, b, n, budget, view.k_min)[0]
 
 
 @numba.njit(cache=True)

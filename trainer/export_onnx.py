@@ -9,7 +9,7 @@ import onnx
 from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
-from schemas.bundle import FEATURE_LIMIT, GAIN_FLOOR
+from schemas.bundle import ACTIVATIONS, FEATURE_LIMIT
 from trainer.weights import Weights
 
 OPSET: Final = 17
@@ -18,7 +18,7 @@ IR_VERSION: Final = 8
 
 
 def onnx_model(weights: Weights) -> bytes:
-    """Serialised model: input `features` float32 [pixels, F] (raw, in the manifest's order), outputs `a`, `b` [pixels].
+    """Serialised model: input `features` float32 [pixels, F] (raw), outputs float32 [pixels] each.
 
     The normalisation is not folded into the first layer: with a feature of small spread that would cancel in float32.
     """
@@ -47,19 +47,26 @@ def onnx_model(weights: Weights) -> bytes:
             nodes.append(helper.make_node("Relu", [current], [f"hidden{i}"]))
             current = f"hidden{i}"
     axis = constant("axis", np.array([1], dtype=np.int64))
-    sizes = constant("sizes", np.array([1, 1], dtype=np.int64))
-    nodes += [
-        helper.make_node("Split", [current, sizes], ["a_column", "b_column"], axis=1),
-        helper.make_node("Squeeze", ["a_column", axis], ["a"]),
-        helper.make_node("Softplus", ["b_column"], ["b_positive"]),
-        helper.make_node("Add", ["b_positive", constant("floor", np.array([GAIN_FLOOR], np.float32))], ["b_sum"]),
-        helper.make_node("Squeeze", ["b_sum", axis], ["b"]),
-    ]
+    columns = [f"{name}_raw" for name in weights.outputs]
+    nodes.append(
+        helper.make_node("Split", [current, constant("sizes", np.ones(len(columns), np.int64))], columns, axis=1)
+    )
+    for name, column in zip(weights.outputs, columns, strict=True):
+        function, scale, offset = ACTIVATIONS[name]
+        if function != "identity":
+            nodes.append(helper.make_node(function.capitalize(), [column], [f"{name}_{function}"]))
+            column = f"{name}_{function}"
+        for operator, factor, neutral in (("Mul", scale, 1.0), ("Add", offset, 0.0)):
+            if factor != neutral:
+                value = constant(f"{name}_{operator.lower()}_by", np.array([factor], np.float32))
+                nodes.append(helper.make_node(operator, [column, value], [f"{name}_{operator.lower()}"]))
+                column = f"{name}_{operator.lower()}"
+        nodes.append(helper.make_node("Squeeze", [column, axis], [name]))
     graph = helper.make_graph(
         nodes,
-        "gain-curve",
+        weights.head,
         [helper.make_tensor_value_info("features", TensorProto.FLOAT, ["pixels", len(weights.features)])],
-        [helper.make_tensor_value_info(name, TensorProto.FLOAT, ["pixels"]) for name in ("a", "b")],
+        [helper.make_tensor_value_info(name, TensorProto.FLOAT, ["pixels"]) for name in weights.outputs],
         constants,
     )
     model = helper.make_model(

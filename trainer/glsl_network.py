@@ -19,7 +19,7 @@ _GROUP: Final = 64
 _MAIN: Final = f"""
 layout(local_size_x = {_GROUP}) in;
 layout(std430, binding = 0) readonly buffer Inputs {{ float inputs[]; }};
-layout(std430, binding = 1) writeonly buffer Outputs {{ vec2 outputs[]; }};
+layout(std430, binding = 1) writeonly buffer Outputs {{ float outputs[]; }};
 uniform uint rows;
 
 void main() {{
@@ -27,21 +27,34 @@ void main() {{
     if (row >= rows) return;
     float x[DIAPHANE_FEATURES];
     for (int i = 0; i < DIAPHANE_FEATURES; ++i) x[i] = inputs[row * uint(DIAPHANE_FEATURES) + uint(i)];
+#if DIAPHANE_OUTPUTS == 1
     outputs[row] = diaphane_predict(x);
+#elif DIAPHANE_OUTPUTS == 2
+    vec2 y = diaphane_predict(x);
+#else
+    vec3 y = diaphane_predict(x);
+#endif
+#if DIAPHANE_OUTPUTS > 1
+    for (int i = 0; i < DIAPHANE_OUTPUTS; ++i) outputs[row * uint(DIAPHANE_OUTPUTS) + uint(i)] = y[i];
+#endif
 }}
 """
 
 
-def glsl_outputs(path: Path, inputs: NDArray[np.float32], ctx: moderngl.Context) -> NDArray[np.float32]:
+def glsl_outputs(
+    path: Path, inputs: NDArray[np.float32], ctx: moderngl.Context, outputs: int = 2, data: Path | None = None
+) -> NDArray[np.float32]:
     """What a GLSL file answers.
 
     Args:
-        path: A bundle's `predict.glsl`.
+        path: A bundle's `predict.glsl`, or another of its GLSL files.
         inputs: float32 [R, F] in the order of its features.
         ctx: The GL context.
+        outputs: How many numbers it answers.
+        data: What its uniform block holds; None where it has none.
 
     Returns:
-        float32 [R, 2], a and b.
+        float32 [R, outputs].
 
     Raises:
         Problem: The driver does not compile it.
@@ -51,9 +64,11 @@ def glsl_outputs(path: Path, inputs: NDArray[np.float32], ctx: moderngl.Context)
     except moderngl.Error as reason:
         raise refused(f"{path.name} does not compile: {reason}") from reason
     source = ctx.buffer(reserve=min(CHUNK, len(inputs)) * inputs.shape[1] * 4)
-    target = ctx.buffer(reserve=min(CHUNK, len(inputs)) * 8)
+    target = ctx.buffer(reserve=min(CHUNK, len(inputs)) * 4 * outputs)
+    block = ctx.buffer(data.read_bytes() if data else bytes(16))
     parts = []
     try:
+        block.bind_to_uniform_block(0)
         for start in range(0, len(inputs), CHUNK):
             chunk = inputs[start : start + CHUNK]
             source.write(chunk.tobytes())
@@ -62,9 +77,9 @@ def glsl_outputs(path: Path, inputs: NDArray[np.float32], ctx: moderngl.Context)
             shader["rows"] = len(chunk)
             shader.run(-(-len(chunk) // _GROUP))
             ctx.memory_barrier()
-            parts.append(np.frombuffer(target.read(len(chunk) * 8), dtype=np.float32).reshape(-1, 2))
+            parts.append(np.frombuffer(target.read(len(chunk) * 4 * outputs), dtype=np.float32).reshape(-1, outputs))
     finally:
-        for resource in (source, target, shader):
+        for resource in (source, target, block, shader):
             resource.release()
     return np.concatenate(parts)
 

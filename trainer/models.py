@@ -1,26 +1,41 @@
-"""The gain-curve network in torch, for training and as one side of the parity check."""
+"""Networks in torch, for training and as one side of the parity check."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from schemas.bundle import FEATURE_LIMIT, GAIN_FLOOR
+from schemas.bundle import ACTIVATIONS, FEATURE_LIMIT, HeadName, OutputName
 from trainer.weights import Weights
 
+_FUNCTIONS: Final = {"identity": lambda x: x, "softplus": nn.functional.softplus, "sigmoid": torch.sigmoid}
+"""Those of `ACTIVATIONS`."""
 
-class GainCurve(nn.Module):
-    """Normalise, dense layers with ReLU, two outputs: `a` (log gain of the first fragment) and `b` (its fall).
+
+def activate(outputs: Sequence[OutputName], raw: Tensor) -> Tensor:
+    """A network's answer, float32 [R, outputs], from what its last layer gives, of the same shape."""
+    columns = []
+    for i, name in enumerate(outputs):
+        function, scale, offset = ACTIVATIONS[name]
+        columns.append(scale * _FUNCTIONS[function](raw[:, i]) + offset)
+    return torch.stack(columns, dim=1)
+
+
+class Network(nn.Module):
+    """Normalise, dense layers with ReLU, and the outputs of a head (`schemas.bundle.ACTIVATIONS`).
 
     Args:
         features: Names of the inputs.
         mean: float32 [F], mean of the inputs.
         std: float32 [F], spread of the inputs, > 0.
         hidden: Units of the hidden layers.
+        head: How the outputs are read.
+        outputs: What is answered, in this order.
     """
 
     mean: Tensor
@@ -32,45 +47,50 @@ class GainCurve(nn.Module):
         mean: NDArray[np.float32],
         std: NDArray[np.float32],
         hidden: Sequence[int] = (32, 16),
+        head: HeadName = "gain-curve",
+        outputs: Sequence[OutputName] = ("a", "b"),
     ) -> None:
         super().__init__()
-        self.features = tuple(features)
+        self.features, self.head, self.outputs = tuple(features), head, tuple(outputs)
         self.register_buffer("mean", torch.from_numpy(mean.astype(np.float32)))
         self.register_buffer("std", torch.from_numpy(std.astype(np.float32)))
-        sizes = (len(self.features), *hidden, 2)
+        sizes = (len(self.features), *hidden, len(self.outputs))
         self.layers = nn.ModuleList(nn.Linear(sizes[i], sizes[i + 1]) for i in range(len(sizes) - 1))
 
-    def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
-        """Gain curves of pixels.
+    def forward(self, x: Tensor) -> Tensor:
+        """What the network answers.
 
         Args:
             x: float32 [R, F], the features named in `features`.
 
         Returns:
-            a, b: float32 [R]; b >= GAIN_FLOOR.
+            float32 [R, outputs].
         """
         x = torch.clamp((x - self.mean) / self.std, -FEATURE_LIMIT, FEATURE_LIMIT)
         for layer in self.layers[:-1]:
             x = torch.relu(layer(x))
-        out = self.layers[-1](x)
-        return out[:, 0], nn.functional.softplus(out[:, 1]) + GAIN_FLOOR
+        return activate(self.outputs, self.layers[-1](x))
+
+    @property
+    def dense(self) -> list[nn.Linear]:
+        """The layers, from the inputs to the outputs."""
+        return [layer for layer in self.layers if isinstance(layer, nn.Linear)]
 
     def weights(self) -> Weights:
         """A copy of the weights as plain arrays."""
-        layers = [
-            (layer.weight.detach().numpy().copy(), layer.bias.detach().numpy().copy())
-            for layer in self.layers
-            if isinstance(layer, nn.Linear)
-        ]
-        return Weights(self.features, self.mean.numpy().copy(), self.std.numpy().copy(), tuple(layers))
+        layers = tuple(
+            (layer.weight.detach().numpy().copy(), layer.bias.detach().numpy().copy()) for layer in self.dense
+        )
+        return Weights(
+            self.features, self.mean.numpy().copy(), self.std.numpy().copy(), layers, self.head, self.outputs
+        )
 
     @classmethod
-    def from_weights(cls, weights: Weights) -> GainCurve:
+    def from_weights(cls, weights: Weights) -> Network:
         """The network with the given weights."""
-        model = cls(weights.features, weights.mean, weights.std, weights.hidden)
+        network = cls(weights.features, weights.mean, weights.std, weights.hidden, weights.head, weights.outputs)
         with torch.no_grad():
-            for layer, (weight, bias) in zip(model.layers, weights.layers, strict=True):
-                if isinstance(layer, nn.Linear):
-                    layer.weight.copy_(torch.from_numpy(weight))
-                    layer.bias.copy_(torch.from_numpy(bias))
-        return model
+            for layer, (weight, bias) in zip(network.dense, weights.layers, strict=True):
+                layer.weight.copy_(torch.from_numpy(weight))
+                layer.bias.copy_(torch.from_numpy(bias))
+        return network

@@ -1,11 +1,13 @@
-"""A gain-curve network as plain arrays: what every exported form is made from, and inference in numpy."""
+"""A network as plain arrays: what every exported form is made from, and inference in numpy."""
 
 from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +15,7 @@ from safetensors import safe_open
 from safetensors.numpy import save_file
 
 from renderer.features import FEATURES
-from schemas.bundle import FEATURE_LIMIT, GAIN_FLOOR
+from schemas.bundle import ACTIVATIONS, FEATURE_LIMIT, HeadName, OutputName
 
 Layer = tuple[NDArray[np.float32], NDArray[np.float32]]
 """Weight float32 [out, in] and bias float32 [out]."""
@@ -24,19 +26,23 @@ _CHUNK = 1 << 14
 
 @dataclass(frozen=True)
 class Weights:
-    """A gain-curve network.
+    """A network.
 
     Attributes:
         features: Names of its inputs, members of `renderer.features.FEATURES`.
         mean: float32 [F], subtracted from the inputs.
         std: float32 [F], > 0, what the inputs are divided by after that.
-        layers: Dense layers, ReLU between them; the last gives (a, softplus^-1(b - GAIN_FLOOR)).
+        layers: Dense layers, ReLU between them; `schemas.bundle.ACTIVATIONS` makes the outputs of the last.
+        head: How the outputs are read.
+        outputs: What the network answers, in this order; one of `schemas.bundle.HEADS[head]`.
     """
 
     features: tuple[str, ...]
     mean: NDArray[np.float32]
     std: NDArray[np.float32]
     layers: tuple[Layer, ...]
+    head: HeadName = "gain-curve"
+    outputs: tuple[OutputName, ...] = ("a", "b")
 
     @property
     def columns(self) -> list[int]:
@@ -50,50 +56,97 @@ class Weights:
 
     def digest(self) -> str:
         """Hex sha256 over everything that decides what the network answers."""
-        hasher = hashlib.sha256(json.dumps(self.features).encode())
+        hasher = hashlib.sha256(json.dumps([self.features, self.head, self.outputs]).encode())
         for array in (self.mean, self.std, *(array for layer in self.layers for array in layer)):
             hasher.update(np.ascontiguousarray(array).tobytes())
         return hasher.hexdigest()
 
-    def predict(self, features: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Gain curves of pixels.
+    def run(self, features: NDArray[np.float32]) -> NDArray[np.float32]:
+        """What the network answers.
 
         Args:
-            features: float32 [R, 26], columns `renderer.features.FEATURES`.
+            features: float32 [R, C], columns `renderer.features.FEATURES`.
+
+        Returns:
+            float32 [R, outputs].
+        """
+        return self.answer(features, self.columns)
+
+    def answer(self, inputs: NDArray[np.float32], columns: Sequence[int] | None = None) -> NDArray[np.float32]:
+        """What the network answers to inputs of its own.
+
+        Args:
+            inputs: float32 [R, C].
+            columns: Where the inputs named in `features` are in it, in that order; None: they are its columns.
+
+        Returns:
+            float32 [R, outputs].
+        """
+        read = slice(None) if columns is None else list(columns)
+        answers = np.empty((len(inputs), len(self.outputs)), dtype=np.float32)
+        for start in range(0, len(inputs), _CHUNK):
+            part = slice(start, start + _CHUNK)
+            x = np.clip((inputs[part, read] - self.mean) / self.std, -FEATURE_LIMIT, FEATURE_LIMIT)
+            for weight, bias in self.layers[:-1]:
+                x = np.maximum(x @ weight.T + bias, np.float32(0.0))
+            weight, bias = self.layers[-1]
+            answers[part] = activate(self.outputs, x @ weight.T + bias)
+        return answers
+
+    def predict(self, features: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Gain curves of pixels; the head must be `gain-curve`.
+
+        Args:
+            features: float32 [R, C], columns `renderer.features.FEATURES`.
 
         Returns:
             a and b, float32 [R] each: the log gain of core fragment k is `a - b (k - 1)`, b >= GAIN_FLOOR.
         """
-        a, b = (np.empty(len(features), dtype=np.float32) for _ in range(2))
-        for start in range(0, len(features), _CHUNK):
-            part = slice(start, start + _CHUNK)
-            x = np.clip((features[part, self.columns] - self.mean) / self.std, -FEATURE_LIMIT, FEATURE_LIMIT)
-            for weight, bias in self.layers[:-1]:
-                x = np.maximum(x @ weight.T + bias, np.float32(0.0))
-            weight, bias = self.layers[-1]
-            out = x @ weight.T + bias
-            # softplus, without overflow
-            a[part] = out[:, 0]
-            b[part] = np.maximum(out[:, 1], 0.0) + np.log1p(np.exp(-np.abs(out[:, 1]))) + np.float32(GAIN_FLOOR)
+        answers = self.run(features)
+        a, b = (np.ascontiguousarray(answers[:, self.outputs.index(name)]) for name in ("a", "b"))
         return a, b
 
 
+def activate(outputs: Sequence[OutputName], raw: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A network's answer, float32 [R, outputs], from what its last layer gives, of the same shape."""
+    columns = []
+    for i, name in enumerate(outputs):
+        function, scale, offset = ACTIVATIONS[name]
+        columns.append(np.float32(scale) * _FUNCTIONS[function](raw[:, i]) + np.float32(offset))
+    return np.stack(columns, axis=1)
+
+
+def _softplus(x: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.asarray(np.maximum(x, 0.0) + np.log1p(np.exp(-np.abs(x))), dtype=np.float32)
+
+
+def _sigmoid(x: NDArray[np.float32]) -> NDArray[np.float32]:
+    small = np.exp(-np.abs(x))
+    return np.asarray(np.where(x < 0.0, small, 1.0) / (1.0 + small), dtype=np.float32)
+
+
+_FUNCTIONS: Final = {"identity": lambda x: x, "softplus": _softplus, "sigmoid": _sigmoid}
+"""Those of `ACTIVATIONS`, without overflow."""
+
+
 def save_weights(path: Path, weights: Weights) -> None:
-    """Write a network to a safetensors file; the names of its features are in the metadata."""
+    """Write a network to a safetensors file; names of its features, head and outputs are in the metadata."""
     tensors = {"mean": weights.mean, "std": weights.std}
     for index, (weight, bias) in enumerate(weights.layers):
         tensors |= {
             f"layer{index}.weight": np.ascontiguousarray(weight),
             f"layer{index}.bias": np.ascontiguousarray(bias),
         }
-    save_file(tensors, path, metadata={"features": json.dumps(weights.features)})
+    names = {"features": json.dumps(weights.features), "head": weights.head, "outputs": json.dumps(weights.outputs)}
+    save_file(tensors, path, metadata=names)
 
 
 def load_weights(path: Path) -> Weights:
     """Read what `save_weights` wrote."""
     with safe_open(path, framework="numpy") as file:
-        features = tuple(json.loads(file.metadata()["features"]))
+        names = file.metadata()
         tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - it is no dict
+    features, outputs = (tuple(json.loads(names[key])) for key in ("features", "outputs"))
     count = sum(name.endswith(".bias") for name in tensors)
     layers = tuple((tensors[f"layer{index}.weight"], tensors[f"layer{index}.bias"]) for index in range(count))
-    return Weights(features, tensors["mean"], tensors["std"], layers)
+    return Weights(features, tensors["mean"], tensors["std"], layers, names["head"], outputs)

@@ -9,8 +9,10 @@ from schemas.bundle import (
     MANIFEST,
     FeatureSpec,
     Manifest,
+    OnnxSpec,
     ParityReport,
     Provenance,
+    SelfTest,
     TailSpec,
     file_spec,
     layer_specs,
@@ -35,6 +37,7 @@ def make_bundle(
         (folder / name).write_text(f"{name} {weights}")
     manifest = Manifest(
         name="glass",
+        outputs=("a", "b"),
         features=(FeatureSpec(name="count", mean=0.0, std=1.0),),
         hidden=(4,),
         layers=layer_specs(1, (4,)),
@@ -42,6 +45,10 @@ def make_bundle(
         metric="display",
         k_min=1,
         files={name: file_spec(folder / name) for name in FILES},
+        onnx=OnnxSpec(opset=17, ir_version=8),
+        self_test=SelfTest(
+            features=(), outputs=(), sums=(), derived=(), tolerance={}, feature_tolerance=1e-4, output_scale=(1.0, 1.0)
+        ),
         parity=ParityReport(count=10, tolerance=TOLERANCE, torch_onnx=1e-7, torch_glsl=parity, driver="llvmpipe"),
         provenance=Provenance(scenes=scenes or {"bottles": "0" * 64}, code_version="v1", seed=0, machine="a machine"),
         evaluation={"views": 2},

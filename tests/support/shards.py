@@ -41,7 +41,7 @@ def member(file: str, asset: str, split: Split, sha256: str | None = None, view:
     return Member(file, asset, split, SourceView(scene=f"digest of {asset}", view=view, camera=camera), sha256)
 
 
-def random_dataset(folder: Path) -> DatasetIndex:
+def random_dataset(folder: Path, fraction: float = 0.5) -> DatasetIndex:
     """Two views of `box` and one of `town` to train on, one view of `glass` held out."""
     asked: list[tuple[str, Split, str]] = [
         ("box", "train", "front"),
@@ -52,6 +52,6 @@ def random_dataset(folder: Path) -> DatasetIndex:
     members = []
     for number, (asset, split, view) in enumerate(asked):
         file = f"{asset}-{view}.safetensors"
-        written = random_shard(folder / file, seed=number)
+        written = random_shard(folder / file, seed=number, fraction=fraction)
         members.append(member(file, asset, split, written.sha256, view))
     return write_index(folder, members, CODE)

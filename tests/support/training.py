@@ -14,10 +14,12 @@ from labeller.curves import error_curves
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
 from renderer.features import FEATURES, derive, gather
-from schemas.bundle import Provenance, TailSpec
+from schemas.bundle import HeadName, OutputName, Provenance, TailSpec
+from schemas.tail import TailName
 from support.dumps import random_dump
 from trainer.bundle import Description, export_bundle
 from trainer.dataset import ViewData, make_view
+from trainer.paper import with_paper_inputs
 from trainer.weights import Layer, Weights
 
 
@@ -44,10 +46,23 @@ def random_view(asset: str, seed: int, size: int = 40, max_n: int = 12) -> ViewD
     )
 
 
-def random_weights(seed: int, features: tuple[str, ...] = FEATURES, hidden: tuple[int, ...] = (32, 16)) -> Weights:
+def random_paper_view(asset: str, seed: int, size: int = 40, max_n: int = 12) -> ViewData:
+    """`random_view` with what DHOIT's network reads."""
+    dump = random_dump(size, size, max_n, seed)
+    pixel = np.flatnonzero(dump.counts > 1)
+    return with_paper_inputs(random_view(asset, seed, size, max_n), dump, pixel, [dump.total // 4, dump.total // 2])
+
+
+def random_weights(
+    seed: int,
+    features: tuple[str, ...] = FEATURES,
+    hidden: tuple[int, ...] = (32, 16),
+    head: HeadName = "gain-curve",
+    outputs: tuple[OutputName, ...] = ("a", "b"),
+) -> Weights:
     """A network whose outputs have the size that trained ones have."""
     rng = np.random.default_rng(seed)
-    sizes = (len(features), *hidden, 2)
+    sizes = (len(features), *hidden, len(outputs))
     layers: list[Layer] = [
         (
             rng.normal(0.0, 1.5 / math.sqrt(fan_in), (fan_out, fan_in)).astype(np.float32),
@@ -55,17 +70,20 @@ def random_weights(seed: int, features: tuple[str, ...] = FEATURES, hidden: tupl
         )
         for fan_in, fan_out in pairwise(sizes)
     ]
-    layers[-1][1][0] = -8.0
+    if head == "gain-curve":
+        layers[-1][1][0] = -8.0
     mean = rng.normal(0.0, 0.5, len(features)).astype(np.float32)
     std = rng.uniform(0.05, 1.0, len(features)).astype(np.float32)
-    return Weights(features, mean, std, tuple(layers))
+    return Weights(features, mean, std, tuple(layers), head, outputs)
 
 
-def export_random(folder: Path, network: Weights, features: NDArray[np.float32], gl: moderngl.Context) -> None:
-    """A bundle of a network in a folder, its three forms compared on these features."""
+def export_random(
+    folder: Path, network: Weights, features: NDArray[np.float32], gl: moderngl.Context, tail: TailName = "density"
+) -> None:
+    """A bundle of a network in a folder, its forms compared on these features."""
     description = Description(
         name="random",
-        tail=TailSpec(name="density", g=0.75),
+        tail=TailSpec(name=tail, g=0.75),
         metric="display",
         k_min=1,
         provenance=Provenance(scenes={}, code_version="0", seed=0, machine="test"),

@@ -12,9 +12,26 @@ import pytest
 from safetensors.numpy import load_file, save_file
 from support.training import random_weights, real_features
 
-from schemas.bundle import FILES, MANIFEST, WEIGHTS, Manifest, Provenance, TailSpec, file_spec, load_manifest
+from renderer.features import FEATURES, derive
+from schemas.bundle import (
+    FILES,
+    GLSL,
+    GLSL_HALF,
+    HALF_FILES,
+    MANIFEST,
+    ONNX,
+    SHADERS,
+    WEIGHTS,
+    Manifest,
+    Provenance,
+    TailSpec,
+    file_spec,
+    load_manifest,
+)
 from schemas.problem import Problem
 from trainer.bundle import Description, export_bundle, load_bundle
+from trainer.export_forms import float_forms
+from trainer.weights import Weights
 
 NAMES = ("log_n", "optical_depth", "rgb_std_g", "depth_std")
 DESCRIPTION = Description(
@@ -56,6 +73,61 @@ def test_what_is_written_is_read_back(folder: Path) -> None:
 
 def test_the_bundle_holds_nothing_else(folder: Path) -> None:
     assert {path.name for path in folder.iterdir()} == {*FILES, MANIFEST}
+
+
+def test_a_network_that_float16_does_not_bear_has_no_files_in_it(gl: moderngl.Context, tmp_path: Path) -> None:
+    for factor in (3e4, 1e6):  # activations overflow; weights do
+        weights = random_weights(1, NAMES, (8,))
+        weights.layers[0][0][:] *= np.float32(factor)
+        weights.layers[1][0][:] /= np.float32(factor)
+        folder = tmp_path / str(factor)
+        manifest = export_bundle(folder, weights, DESCRIPTION, real_features(500, 1), gl)
+        assert set(manifest.files) == set(FILES) - set(HALF_FILES)
+        assert {path.name for path in folder.iterdir()} == {*manifest.files, MANIFEST}
+        assert manifest.self_test is not None
+        assert GLSL_HALF not in manifest.self_test.tolerance
+        assert load_manifest(folder) == manifest
+
+
+def test_what_the_network_does_not_use_is_left_out(gl: moderngl.Context, tmp_path: Path) -> None:
+    weights, features = random_weights(1, NAMES, (8,)), real_features(500, 1)
+    weights.layers[0][0][:, 1] = 0.0
+    weights.layers[0][1][3] = -1000.0
+    manifest = export_bundle(tmp_path / "b", weights, DESCRIPTION, features, gl)
+    assert manifest.feature_names == (NAMES[0], *NAMES[2:])
+    assert manifest.hidden == (7,)
+    np.testing.assert_allclose(load_bundle(tmp_path / "b").weights.run(features), weights.run(features), rtol=1e-6)
+
+
+def test_the_self_test_is_of_real_inputs_and_right(folder: Path) -> None:
+    weights, manifest = random_weights(1, NAMES, (8,)), load_manifest(folder)
+    test, features = manifest.self_test, real_features(500, 1)
+    assert test is not None
+    assert len(test.features) == len(test.outputs) == 16
+    rows = np.array(test.features, np.float32)
+    assert all((features[:, weights.columns] == row).all(axis=1).any() for row in rows)
+    everything = np.zeros((16, len(FEATURES)), np.float32)
+    everything[:, weights.columns] = rows
+    np.testing.assert_allclose(weights.run(everything), test.outputs, rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(derive(np.array(test.sums, np.float32))[:, weights.columns], test.derived)
+    assert len(set(test.sums)) == len(test.sums) == 8
+    assert set(test.tolerance) == {ONNX, *SHADERS}
+    assert test.output_scale == tuple(np.maximum(1.0, np.abs(weights.run(features)).max(axis=0)))
+
+
+def test_a_bundle_of_the_first_format_is_read(folder: Path) -> None:
+    manifest = json.loads((folder / MANIFEST).read_text())
+    for key in ("outputs", "onnx", "self_test"):
+        del manifest[key]
+    manifest["format"] = "diaphane-bundle/1"
+    manifest["files"] = {name: manifest["files"][name] for name in (WEIGHTS, ONNX, GLSL)}
+    manifest["parity"] = {
+        key: manifest["parity"][key] for key in ("count", "tolerance", "torch_onnx", "torch_glsl", "driver")
+    }
+    (folder / MANIFEST).write_text(json.dumps(manifest))
+    bundle = load_bundle(folder)
+    assert bundle.manifest.outputs == bundle.weights.outputs == ("a", "b")
+    assert bundle.manifest.parity.worst == max(manifest["parity"][key] for key in ("torch_onnx", "torch_glsl"))
 
 
 def test_predict_glsl_computes_only_the_features_that_are_read(folder: Path) -> None:
@@ -101,6 +173,13 @@ def _set(manifest: dict[str, object], key: str, value: object) -> None:
         (lambda m: m["layers"][0].update(shape=[8, 5]), "layers do not follow"),
         (lambda m: m["files"].update({"../model.onnx": m["files"]["model.onnx"]}), "the files must be"),
         (lambda m: m["files"].pop("model.onnx"), "the files must be"),
+        (lambda m: m["files"].pop("predict_half.wgsl"), "the files must be"),
+        (lambda m: _set(m, "format", "diaphane-bundle/1"), "the files must be"),
+        (lambda m: m.pop("self_test"), "self_test is missing"),
+        (lambda m: _set(m, "outputs", ["a"]), "does not answer a"),
+        (lambda m: _set(m, "outputs", ["b", "a"]), "does not answer b, a"),
+        (lambda m: _set(m, "head", "importance"), "does not answer a, b"),
+        (lambda m: m.update(head="importance", outputs=["importance"]), "layers do not follow"),
         (lambda m: m["files"]["model.onnx"].update(bytes=1 << 40), "bytes"),
     ],
 )
@@ -150,19 +229,16 @@ def test_features_of_the_future_are_refused(folder: Path) -> None:
 def test_no_bundle_is_left_when_the_forms_differ(
     gl: moderngl.Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("trainer.bundle.glsl_source", lambda weights: _off_by_little(weights))
+    monkeypatch.setattr("trainer.bundle.float_forms", _off_by_little)
     with pytest.raises(Problem, match="differ"):
         export_bundle(tmp_path / "b", random_weights(1, NAMES, (8,)), DESCRIPTION, real_features(500, 1), gl)
     with pytest.raises(Problem, match="is not a bundle"):
         load_manifest(tmp_path / "b")
 
 
-def _off_by_little(weights: object) -> str:
-    from trainer.export_glsl import glsl_source
-    from trainer.weights import Weights
-
-    assert isinstance(weights, Weights)
-    return glsl_source(weights).replace("return vec2(a,", "return vec2(a + 1e-3,")
+def _off_by_little(weights: Weights) -> dict[str, bytes]:
+    forms = float_forms(weights)
+    return {**forms, GLSL: forms[GLSL].replace(b"return vec2(a,", b"return vec2(a + 1e-3,")}
 
 
 def test_manifest_survives_its_own_json(folder: Path) -> None:

@@ -16,7 +16,7 @@ from labeller.hull import lower_hulls
 from labeller.shards import read_shard, write_shard
 from renderer.features import FEATURES
 from schemas.problem import Problem
-from trainer.dataset import GROUP, SEGMENTS, ViewData, load_shards, make_view, normalisation, sample_batch
+from trainer.dataset import GROUP, SEGMENTS, Drawing, ViewData, load_shards, make_view, normalisation, sample_batch
 
 
 def view_of(hulls: list[tuple[list[int], list[float]]], prices: tuple[float, float] = (-9.0, -1.0)) -> ViewData:
@@ -51,7 +51,7 @@ def test_segments_are_the_slopes_between_the_vertices() -> None:
 def hull_errors(view: ViewData, k: NDArray[np.float64]) -> NDArray[np.float64]:
     ks = 1.0 + np.concatenate([[0.0], np.cumsum(view.lengths)])
     drops = (view.slopes * view.lengths).astype(np.float64)
-    return np.interp(k, ks, drops.sum() - np.concatenate([[0.0], np.cumsum(drops)]))
+    return np.asarray(np.interp(k, ks, drops.sum() - np.concatenate([[0.0], np.cumsum(drops)])), dtype=np.float64)
 
 
 def test_long_hulls_are_simplified_from_above_and_stay_convex() -> None:
@@ -82,7 +82,7 @@ def test_a_batch_is_the_same_for_the_same_seed_and_differs_by_step() -> None:
 
 def test_a_batch_holds_the_rows_hulls() -> None:
     view = random_view("a", 3)
-    batch = sample_batch([view], list(range(26)), (0, 0), GROUP)
+    batch = sample_batch([view], list(range(len(FEATURES))), (0, 0), GROUP)
     for i in range(GROUP):
         row = np.flatnonzero((view.features == batch.features[i]).all(axis=1))[0]
         part = slice(view.offsets[row], view.offsets[row + 1])
@@ -99,10 +99,53 @@ def test_assets_are_drawn_equally_often_however_many_views_they_have() -> None:
     assert 0.4 < (drawn == -1.0).mean() < 0.6
 
 
+def test_processes_share_the_groups_of_a_batch() -> None:
+    views = [random_view("a", 1), random_view("b", 2)]
+    whole, *parts = (
+        sample_batch(views, [0, 3], (7, 5), 5 * GROUP, drawing)
+        for drawing in (None, Drawing(rank=0, size=2), Drawing(rank=1, size=2))
+    )
+    assert [part.share for part in (whole, *parts)] == [1.0, 0.6, 0.4]
+    for rank, part in enumerate(parts):
+        for name in ("features", "slopes", "log_lambda"):
+            groups = getattr(whole, name).reshape(5, GROUP, -1)[rank::2]
+            np.testing.assert_array_equal(getattr(part, name).reshape(groups.shape), groups)
+        np.testing.assert_array_equal(part.scale, whole.scale[rank::2])
+
+
+def test_replayed_views_have_their_share() -> None:
+    new, old = random_view("new", 1), random_view("old", 2)
+    new.features[:, 0], old.features[:, 0] = 0.0, 1.0
+    drawing = Drawing(replay=[old], replay_share=0.25)
+    drawn = [sample_batch([new], [0], (0, step), 8 * GROUP, drawing).features.mean() for step in range(50)]
+    assert 0.2 < np.mean(drawn) < 0.3
+
+
+def test_hard_views_are_drawn_by_their_hardness() -> None:
+    easy, hard = random_view("easy", 1), random_view("hard", 2)
+    easy.features[:, 0], hard.features[:, 0] = 0.0, 1.0
+    drawing = Drawing(hardness=[1.0, 9.0], mining=1.0)
+    drawn = [sample_batch([easy, hard], [0], (0, step), 8 * GROUP, drawing).features.mean() for step in range(50)]
+    assert 0.85 < np.mean(drawn) < 0.95
+
+
+def test_noise_has_the_spread_that_is_asked_for_and_changes_nothing_else() -> None:
+    views = [random_view("a", 1)]
+    plain, noisy = (
+        sample_batch(views, [0, 3], (7, 5), 20 * GROUP, drawing)
+        for drawing in (None, Drawing(noise=np.array([0.5, 0.0], np.float32)))
+    )
+    added = noisy.features - plain.features
+    assert added[:, 0].std() == pytest.approx(0.5, rel=0.1)
+    assert (added[:, 1] == 0.0).all()
+    np.testing.assert_array_equal(plain.slopes, noisy.slopes)
+
+
 def test_normalisation_weighs_assets_equally() -> None:
     one, two = random_view("one", 1), random_view("two", 2)
     one.features[:], two.features[:] = 0.0, 1.0
-    mean, std = normalisation([one, two, two, two])
+    views = [one, two, two, two]
+    mean, std = normalisation([view.asset for view in views], [view.moments() for view in views])
     np.testing.assert_allclose(mean, 0.5)
     np.testing.assert_allclose(std, 0.5)
 

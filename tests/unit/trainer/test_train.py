@@ -6,18 +6,21 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support.training import random_view, random_weights
 
+from renderer.features import FEATURES
 from trainer.adam import Adam
 from trainer.checkpoint import load_checkpoint
 from trainer.dataset import GROUP, ViewData
 from trainer.evaluate import evaluate, evaluate_view, geometric_mean
-from trainer.models import GainCurve
-from trainer.train import TrainConfig, TrainResult, train
+from trainer.log import read_log
+from trainer.models import Network
+from trainer.train import TrainConfig, TrainResult, stopping_assets, train
 from trainer.weights import Weights
 
 CONFIG = TrainConfig(steps=60, batch=4 * GROUP, validate_every=20, threads=1)
@@ -117,13 +120,14 @@ def test_a_damaged_checkpoint_is_not_continued(
     assert_same(train(*data, CONFIG, checkpoint=path).weights, result.weights)
 
 
-def test_features_that_never_change_are_not_read(data: tuple[list[ViewData], list[ViewData]]) -> None:
+def test_features_that_never_change_are_not_read(
+    data: tuple[list[ViewData], list[ViewData]], result: TrainResult
+) -> None:
     views = [replace(view, features=view.features.copy()) for view in data[0]]
     for view in views:
-        view.features[:, 2] = 0.33
+        view.features[:, FEATURES.index("alpha_mean")] = 0.33
     weights = train(views, data[1], CONFIG.model_copy(update={"steps": 1})).weights
-    assert len(weights.features) == 25
-    assert "alpha_mean" not in weights.features
+    assert set(result.weights.features) - set(weights.features) == {"alpha_mean"}
 
 
 def test_evaluation_is_exact_for_a_predictor_that_knows_the_hull() -> None:
@@ -135,8 +139,91 @@ def test_evaluation_is_exact_for_a_predictor_that_knows_the_hull() -> None:
     assert scores[2].optimum == 0.0, "at a price near 0 the optimum keeps everything that matters"
 
 
+def test_a_training_stops_when_the_assets_kept_out_get_no_better() -> None:
+    views = [random_view(asset, seed) for seed, asset in enumerate("aabcd")]
+    config = CONFIG.model_copy(update={"steps": 400, "validate_every": 5, "patience": 2, "lr": 0.5})
+    stopped = train(views, (), config)
+    assert len(stopped.kept_out) == 1
+    assert stopped.history[-1].step < 400
+    scores = [point.score for point in stopped.history]
+    assert min(scores[:-2]) <= min(scores[-2:])
+    assert stopped.score == min(scores)
+    judges = [view for view in views if view.asset in stopped.kept_out]
+    assert geometric_mean(evaluate(stopped.weights, judges)) == pytest.approx(stopped.score)
+
+
+def test_a_stopped_training_is_not_taken_up_again(tmp_path: Path) -> None:
+    views = [random_view(asset, seed) for seed, asset in enumerate("abcd")]
+    config = CONFIG.model_copy(update={"steps": 400, "validate_every": 5, "patience": 1, "lr": 0.5})
+    first = train(views, (), config, checkpoint=tmp_path / "c")
+    seen: list[int] = []
+    again = train(views, (), config, lambda step, *_: seen.append(step), tmp_path / "c")
+    assert not seen
+    assert again.history == first.history
+
+
+@pytest.mark.parametrize(("assets", "count"), [("aab", 0), ("abc", 1), ("abcdefghij", 2)])
+def test_assets_to_stop_by_are_whole_and_a_share_of_all(assets: str, count: int) -> None:
+    chosen = stopping_assets(list(assets), 5, seed=3)
+    assert len(chosen) == count
+    assert set(chosen) <= set(assets)
+    assert chosen == stopping_assets(sorted(assets, reverse=True), 5, seed=3)
+
+
+def test_replayed_assets_are_not_forgotten() -> None:
+    old, new = [random_view("old", 1)], [random_view("new", 2)]
+    new[0].features[:] *= -1.0  # the same curves, said in other words
+    began = train(old, (), CONFIG.model_copy(update={"steps": 400, "validate_every": 100}))
+    config = CONFIG.model_copy(update={"steps": 400, "validate_every": 400})
+    without, with_replay = (train(new, (), config, start=began.weights, replay=replay).weights for replay in ((), old))
+    before, lost, kept = (geometric_mean(evaluate(found, old)) for found in (began.weights, without, with_replay))
+    assert kept < 1.1 * before < 0.8 * lost
+
+
+def test_the_log_says_how_it_went(data: tuple[list[ViewData], list[ViewData]], tmp_path: Path) -> None:
+    result = train(*data, CONFIG, log=tmp_path / "log.jsonl")
+    lines = read_log(tmp_path / "log.jsonl")
+    assert [line.step for line in lines] == [20, 40, 50, 60]
+    assert [(x.step, x.loss, x.score) for x in lines if x.score is not None] == [
+        (x.step, x.loss, x.score) for x in result.history
+    ]
+    assert all(earlier.lr > later.lr for earlier, later in pairwise(lines))
+    assert all(earlier.seconds < later.seconds for earlier, later in pairwise(lines))
+    assert min(line.rows_per_second for line in lines) > 0.0
+
+
+def test_a_log_that_was_cut_off_is_continued(data: tuple[list[ViewData], list[ViewData]], tmp_path: Path) -> None:
+    def kill(step: int, *_: object) -> None:
+        if step == 50:
+            raise KeyboardInterrupt
+
+    log, path = tmp_path / "log.jsonl", tmp_path / "c"
+    with pytest.raises(KeyboardInterrupt):
+        train(*data, CONFIG.model_copy(update=EVERY_STEP), kill, path, log=log)
+    log.write_text(log.read_text() + '{"step": 50, "lo')
+    train(*data, CONFIG, checkpoint=path, log=log)
+    assert [line.step for line in read_log(log)] == [20, 40, 50, 60]
+
+
+def test_hard_views_are_drawn_more_often_and_the_state_of_that_is_kept(
+    data: tuple[list[ViewData], list[ViewData]], tmp_path: Path
+) -> None:
+    config = CONFIG.model_copy(update={"mining": 0.8})
+    whole = train(*data, config)
+    assert whole.history != train(*data, CONFIG).history
+
+    def kill(step: int, *_: object) -> None:
+        if step == 50:
+            raise KeyboardInterrupt
+
+    path = tmp_path / "c"
+    with pytest.raises(KeyboardInterrupt):
+        train(*data, config.model_copy(update=EVERY_STEP), kill, path)
+    assert_same(train(*data, config, checkpoint=path).weights, whole.weights)
+
+
 def test_missing_checkpoint_is_none(tmp_path: Path) -> None:
-    model = GainCurve.from_weights(random_weights(0))
+    model = Network.from_weights(random_weights(0))
     optimiser = Adam(model.parameters())
     assert load_checkpoint(tmp_path / "none", "key", model, optimiser) is None
 
