@@ -6,7 +6,7 @@ ARGS ?=
 # The scenes that the result is judged by, and that are never trained on.
 HOLDOUT ?= bottles foliage
 
-.PHONY: help setup setup-tests quickstart test lint format lock clean
+.PHONY: help setup setup-tests quickstart bench test lint format lock clean
 
 help: ## this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -17,6 +17,9 @@ setup: ## virtual environment, dependencies, OpenGL
 quickstart: setup ## sample scenes, then the main job on them; prints where the report is
 	$(BIN)/diaphane samples samples
 	$(BIN)/diaphane build samples/*.usd* --budgets 1,2,4 --name quickstart $(addprefix --holdout ,$(HOLDOUT)) $(ARGS)
+
+bench: setup ## every technique on the committed suite; goes on where it stopped (hours; ARGS="--quick": minutes)
+	$(BIN)/python -m benchmarks.suite $(ARGS)
 
 lint: setup ## style, types, direction of imports
 	$(BIN)/ruff check .

@@ -7,6 +7,7 @@ import time
 from datetime import UTC, datetime
 from pathlib import Path
 
+from schemas.network import DEFAULT_NETWORK
 from services import pipeline
 from services.inline import InlineRunner
 from services.local import open_local
@@ -16,6 +17,7 @@ from services.options import BuildOptions
 from services.pipeline import Built
 from services.plan import plan_of_build
 from services.progress import Progress
+from services.replay import fine_tuning
 from services.result import BuildResult
 from services.stages.desk import PAGE
 from services.stages.report import Evaluation, write
@@ -34,13 +36,13 @@ def build(options: BuildOptions, progress: Progress) -> BuildResult:
     started = time.monotonic()
     with open_local(options.state) as local:
         runner = InlineRunner(local.storage, local.registry, Measured(local.database), progress)
-        plan = plan_of_build(options)
+        plan, replay = fine_tuning(plan_of_build(options), options, local.registry, progress)
         for path, scene in zip(options.scenes, plan.scenes, strict=True):
             if options.views is not None and not scene.listed:
                 progress.note(f"{options.views} has no views of {path}: its own cameras or sampled views are used.")
         built = pipeline.build(plan, runner)
         dataset = options.state / "datasets" / options.name
-        write_dataset(dataset, built.views, runner.store)
+        write_dataset(dataset, built.views, runner.store, replay)
         report = options.state / "reports" / options.name / PAGE
         if runner.worked or not report.is_file():
             with progress.stage("report", 1) as stage:
@@ -81,4 +83,8 @@ def command_line(options: BuildOptions) -> str:
     parts += ["--views-per-scene", str(options.views_per_scene), "--tail", options.tail, "--g", f"{options.g:g}"]
     parts += ["--seed", str(options.seed)]
     parts += ["--steps", str(options.steps)] if options.steps is not None else []
+    parts += ["--network", options.network] if options.network != DEFAULT_NETWORK else []
+    parts += ["--patience", str(options.patience)] if options.patience else []
+    parts += ["--from", options.start] if options.start is not None else []
+    parts += ["--replay", str(options.replay)] if options.replay is not None else []
     return shlex.join(parts)

@@ -16,19 +16,21 @@ from pathlib import Path
 from labeller.dataset_index import Member, SourceView, write_index
 from labeller.shards import damaged
 from services.records import LabelledView
+from services.replay import Replay
 from services.stages.desk import SHARD
 from services.store import Store, file_sha256, sync
 
 _SUFFIX = ".safetensors"
 
 
-def write_dataset(folder: Path, views: Sequence[LabelledView], store: Store) -> None:
+def write_dataset(folder: Path, views: Sequence[LabelledView], store: Store, replay: Replay | None = None) -> None:
     """Writes the data set of labelled views; what is there already stays.
 
     Args:
         folder: Of the data set; made if missing.
         views: All views of a build, those of held-out scenes too.
         store: Where their shards lie.
+        replay: Shards of an earlier data set that were trained on as well: they become part of this one.
 
     Raises:
         Problem: A shard in the store is damaged.
@@ -37,6 +39,10 @@ def write_dataset(folder: Path, views: Sequence[LabelledView], store: Store) -> 
     members = [_member(view) for view in views]
     for view, member in zip(views, members, strict=True):
         _provide(store.fetch(view.task.artifact) / SHARD, folder / member.file, view.facts["shard"]["sha256"])
+    for entry in () if replay is None else replay.entries:
+        assert replay is not None
+        _provide(replay.dataset.folder / entry.file, folder / entry.file, entry.sha256)
+        members.append(Member(entry.file, entry.asset, entry.split, entry.source, entry.sha256))
     write_index(folder, members, views[0].task.version)
     for stale in {path.name for path in folder.glob(f"*{_SUFFIX}")} - {member.file for member in members}:
         (folder / stale).unlink(missing_ok=True)

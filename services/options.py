@@ -15,8 +15,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from schemas.network import DEFAULT_NETWORK, SIZES, NetworkSize
 from schemas.problem import ExitCode, Problem
-from schemas.tail import DENSITY_G, TAILS, TailName
+from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAILS, TailName
 from services.registry import check_name
 
 MIN_SIDE = 16
@@ -44,6 +45,11 @@ class BuildOptions:
         g: Steepness of the density tail.
         seed: Seed of everything drawn at random: views, sampled pixels, weights, batches.
         steps: Optimiser steps; None: the trainer's default.
+        network: Size of the network.
+        patience: Validations without a better score after which the training stops; 0: never.
+        start: Bundle whose weights the training begins with: a folder, or a reference of the registry.
+        replay: Folder of a data set that is trained on as well, so that `start` does not forget it; None: that of the
+            bundle's name, where there is one.
         state: Folder of artifacts, registry and reports.
 
     Raises:
@@ -59,10 +65,14 @@ class BuildOptions:
     views_per_scene: int = 3
     width: int = 1430
     height: int = 960
-    tail: TailName = "density"
+    tail: TailName = DEFAULT_TAIL
     g: float = DENSITY_G
     seed: int = 0
     steps: int | None = None
+    network: NetworkSize = DEFAULT_NETWORK
+    patience: int = 0
+    start: str | None = None
+    replay: Path | None = None
     state: Path = field(default=Path(".diaphane"))
 
     def __post_init__(self) -> None:
@@ -128,6 +138,18 @@ def parse_tail(text: str) -> TailName:
     raise Problem(f"There is no tail '{text}'.", f"Use one of {', '.join(TAILS)}: --tail density.")
 
 
+def parse_network(text: str) -> NetworkSize:
+    """The size of that name.
+
+    Raises:
+        Problem: There is none.
+    """
+    for size in SIZES:
+        if size == text:
+            return size
+    raise Problem(f"There is no network '{text}'.", f"Use one of {', '.join(SIZES)}: --network {DEFAULT_NETWORK}.")
+
+
 def default_holdout(scenes: Sequence[Path]) -> tuple[Path, ...]:
     """A quarter of the scenes, at least one; none of a single scene. The choice depends on their names alone."""
     if len(scenes) < 2:
@@ -173,6 +195,8 @@ def _check_numbers(o: BuildOptions) -> None:
     _require(math.isfinite(o.g) and 0.0 <= o.g <= 10.0, f"--g {o.g}", "is not between 0 and 10")
     _require(0 <= o.seed < 2**63, f"--seed {o.seed}", "is not a whole number from 0 to 2^63 - 1")
     _require(o.steps is None or o.steps >= 1, f"--steps {o.steps}", "is not positive")
+    _require(o.patience >= 0, f"--patience {o.patience}", "is negative")
+    _require(o.replay is None or o.start is not None, "--replay", "needs --from: there is nothing to forget without it")
 
 
 def _require(holds: bool, option: str, fault: str) -> None:

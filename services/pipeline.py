@@ -193,7 +193,10 @@ def _learn(
     trained, held_out = (
         {scene.label: scene.digest for scene in scenes if scene.held_out == held} for held in (False, True)
     )
-    return steps.learn(plan, runner, shards, trained, held_out, _start(plan, runner, champion))
+    # A scene that was learned under a name which another one has now keeps a name of its own.
+    known = {label if label not in trained else f"{label}@{d[:8]}": d for label, d in plan.learned.items()}
+    known = {label: digest for label, digest in known.items() if digest not in trained.values()}
+    return steps.learn(plan, runner, shards, {**known, **trained}, held_out, _start(plan, runner, champion))
 
 
 def _champion(plan: Plan, runner: Runner) -> Publication | None:
@@ -213,8 +216,8 @@ def _champion(plan: Plan, runner: Runner) -> Publication | None:
 
 def _start(plan: Plan, runner: Runner, champion: Publication | None) -> Source | None:
     """The weights that the training begins with: without a champion yet, from scratch."""
-    if not plan.from_champion:
-        return None
+    if plan.start is not None or not plan.from_champion:
+        return plan.start
     if champion is None:
         runner.progress.note(f"{plan.name} has no champion yet: the training begins from scratch.")
         return None

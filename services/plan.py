@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from schemas.job import JobSpec
+from schemas.network import DEFAULT_NETWORK, NetworkSize
 from schemas.service import SceneRecord, VersionRecord
 from schemas.tail import TailName
 from schemas.view import ListedView
@@ -48,8 +49,13 @@ class Plan:
         g: Steepness of the density tail.
         seed: Seed of everything drawn at random.
         steps: Optimiser steps; None: the trainer's default.
+        network: Size of the network.
         from_champion: Whether the training begins with the champion's weights.
         promote: Whether a better version becomes the champion.
+        patience: Validations without a better score after which the training stops; 0: never.
+        start: Bundle whose weights the training begins with; None: see `from_champion`.
+        replay: Shards of an earlier data set that are trained on as well.
+        learned: Label -> digest of what `start` and `replay` know, for provenance.
     """
 
     name: str
@@ -63,8 +69,13 @@ class Plan:
     g: float
     seed: int
     steps: int | None
+    network: NetworkSize = DEFAULT_NETWORK
     from_champion: bool = False
     promote: bool = True
+    patience: int = 0
+    start: Source | None = None
+    replay: Source | None = None
+    learned: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def budgets(self) -> tuple[int, ...]:
@@ -125,6 +136,8 @@ def plan_of_build(options: BuildOptions) -> Plan:
         g=options.g,
         seed=options.seed,
         steps=options.steps,
+        network=options.network,
+        patience=options.patience,
     )
 
 
@@ -154,6 +167,7 @@ def plan_of_job(spec: JobSpec, scenes: Mapping[str, SceneRecord]) -> Plan:
         g=spec.g,
         seed=spec.seed,
         steps=spec.steps,
+        network=spec.network,
         from_champion=spec.start_from == "champion",
         promote=spec.promote == "if-better",
     )

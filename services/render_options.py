@@ -41,7 +41,7 @@ class RenderOptions:
         techniques: Names; see `parse_techniques`.
         needs: What some techniques need; the bundle is found by `bundle`.
         budget: F as a multiple of width * height.
-        tail: How fragments beyond the core are approximated.
+        tail: How fragments beyond the core are approximated; None: as the bundle says, or the default.
         g: Steepness of the density tail.
         bundle: Folder of a bundle, or a name in the registry, for `kbuffer-deep`.
         camera: Name or path of a camera.
@@ -64,7 +64,7 @@ class RenderOptions:
     techniques: tuple[str, ...] = (DEFAULT_TECHNIQUE,)
     needs: Needs = field(default_factory=Needs)
     budget: float = 2.0
-    tail: TailName = "density"
+    tail: TailName | None = None
     g: float = DENSITY_G
     bundle: str | None = None
     camera: str | None = None

@@ -18,11 +18,12 @@ from renderer.exr_header import Attribute
 from renderer.frame import Frame
 from renderer.hidden import hidden_fragments
 from renderer.scene import NothingToDraw
-from renderer.techniques import TECHNIQUES, Budget, Rendered, SBuffer, Technique, technique
+from renderer.techniques import TECHNIQUES, Budget, KBufferDeep, Rendered, SBuffer, Technique, technique
 from renderer.techniques.skips import HIDDEN_FRAGMENTS
 from renderer.timecodes import numbered
 from schemas.colour import display8
 from schemas.problem import ExitCode, Problem
+from schemas.tail import DEFAULT_TAIL
 from services.local_scenes import Chosen, LocalScene, as_usd
 from services.progress import Progress
 from services.render_options import RenderOptions
@@ -118,14 +119,23 @@ def render(options: RenderOptions, progress: Progress) -> Iterator[Picture]:
     Raises:
         Problem: A scene cannot be loaded, or the only technique asked for cannot render it.
     """
-    with _bundle(options) as bundle:
+    with bundle_folder(options.bundle, options.state) as bundle:
         needs = replace(options.needs, bundle=bundle, allocate=optimal)
         techniques = [technique(name, needs) for name in options.techniques]
+        options = _with_tail(options, techniques)
         written: set[Path] = set()
         for file in options.scenes:
             with as_usd(file) as usd:
                 scene = LocalScene(file, usd, options.load)
                 yield from _scene(scene, techniques, options, progress, written)
+
+
+def _with_tail(options: RenderOptions, techniques: list[Technique]) -> RenderOptions:
+    """The same with the tail that a network was trained with, where there is one and none is asked for."""
+    if options.tail is not None:
+        return options
+    trained = [each.manifest.tail for each in techniques if isinstance(each, KBufferDeep)]
+    return replace(options, tail=trained[0].name, g=trained[0].g) if trained else options
 
 
 def _scene(
@@ -162,7 +172,8 @@ def _scene(
 
 def _picture(job: _Job, each: Technique, path: Path, options: RenderOptions, warm: set[str]) -> Picture:
     width, height = job.size
-    budget = Budget(max(1, int(options.budget * width * height)), options.tail, options.g)
+    tail = options.tail or DEFAULT_TAIL
+    budget = Budget(max(1, int(options.budget * width * height)), tail, options.g)
     about = Picture(
         file=path,
         scene=job.scene.file,
@@ -174,7 +185,7 @@ def _picture(job: _Job, each: Technique, path: Path, options: RenderOptions, war
         width=width,
         height=height,
         budget=budget.fragments,
-        tail=options.tail,
+        tail=tail,
         warnings=job.scene.gpu().scene.warnings,
     )
     try:
@@ -279,12 +290,17 @@ def optimal(frame: Frame, budget: Budget) -> NDArray[np.int32]:
 
 
 @contextmanager
-def _bundle(options: RenderOptions) -> Iterator[Path | None]:
-    """Folder of the bundle that was asked for: one on disk, or one of the registry."""
-    if options.bundle is None or Path(options.bundle).is_dir():
-        yield None if options.bundle is None else Path(options.bundle)
+def bundle_folder(bundle: str | None, state: Path) -> Iterator[Path | None]:
+    """Folder of the bundle that was asked for: one on disk, or one of the registry; None if none was.
+
+    Args:
+        bundle: A folder, or NAME@ALIAS.
+        state: Folder of the registry.
+    """
+    if bundle is None or Path(bundle).is_dir():
+        yield None if bundle is None else Path(bundle)
         return
     from services.local import open_local
 
-    with open_local(options.state) as local:
-        yield local.registry.folder(local.registry.resolve(options.bundle))
+    with open_local(state) as local:
+        yield local.registry.folder(local.registry.resolve(bundle))

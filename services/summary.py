@@ -78,8 +78,8 @@ class Row:
     """A technique at a budget, over some views.
 
     Attributes:
-        technique: Name of the technique.
-        budget_factor: F / (width * height).
+        technique: Name of the technique; more words may follow it.
+        budget_factor: F / (width * height); 0 for one that reads no budget.
         mse: Geometric mean of max(mse, MSE_FLOOR).
         psnr: That mean in dB.
         flip: Arithmetic mean.

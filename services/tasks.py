@@ -71,6 +71,7 @@ class Task(BaseModel):
         needs: Artifacts that are read, as `stage/key`.
         scene: The scene, where the stage reads it.
         bundle: The published bundle, where the stage renders one that is no artifact.
+        replay: Folder of a data set, and the shards of it that a training replays.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -83,6 +84,7 @@ class Task(BaseModel):
     needs: tuple[str, ...] = ()
     scene: Source | None = None
     bundle: Source | None = None
+    replay: Source | None = None
 
     @property
     def address(self) -> Address:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -33,13 +33,16 @@ class Labels:
     y: str
 
 
-def log_log(labels: Labels, series: Mapping[str, Points], proportional: bool = True) -> str:
+def log_log(
+    labels: Labels, series: Mapping[str, Points], proportional: bool = True, apart: Collection[str] = ()
+) -> str:
     """An SVG document.
 
     Args:
         labels: Words.
         series: Name -> points, all coordinates positive.
         proportional: Draw a dashed line of slope 1 through the last point of the first series.
+        apart: Series whose points no line joins.
     """
     xs, ys = zip(*(point for points in series.values() for point in points), strict=True)
     frame = Frame(_range(xs), _range(ys), width=640.0, height=400.0, right=150.0, left=72.0)
@@ -47,7 +50,7 @@ def log_log(labels: Labels, series: Mapping[str, Points], proportional: bool = T
     if proportional:
         parts.append(_slope(frame, next(iter(series.values()))[-1]))
     for number, (name, points) in enumerate(series.items()):
-        parts.append(_series(frame, number, name, sorted(points)))
+        parts.append(_series(frame, number, name, sorted(points), name not in apart))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {frame.width:g} {frame.height:g}" role="img" '
         f'aria-label="{escape(labels.title)}"><style>{_STYLE}</style>{"".join(parts)}</svg>\n'
@@ -81,7 +84,7 @@ def _slope(frame: Frame, through: tuple[float, float]) -> str:
     return f'<path class="slope" d="M{ends[0]}L{ends[1]}"><title>proportional</title></path>'
 
 
-def _series(frame: Frame, number: int, name: str, points: Points) -> str:
+def _series(frame: Frame, number: int, name: str, points: Points, is_joined: bool) -> str:
     colour = COLOURS[number % len(COLOURS)]
     places = [(frame.px(x), frame.py(y)) for x, y in points]
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in places)
@@ -91,7 +94,8 @@ def _series(frame: Frame, number: int, name: str, points: Points) -> str:
     )
     key_x, key_y = frame.width - frame.right + 14, frame.top + 10 + 18 * number
     key = f'<circle cx="{key_x}" cy="{key_y - 4}" r="3.5" fill="{colour}"/>' + _text(key_x + 9, key_y, name, "start")
-    return f'<polyline fill="none" stroke="{colour}" stroke-width="1.5" points="{path}"/>{marks}{key}'
+    line = f'<polyline fill="none" stroke="{colour}" stroke-width="1.5" points="{path}"/>' if is_joined else ""
+    return f"{line}{marks}{key}"
 
 
 def _text(x: float, y: float, text: str, anchor: str = "middle") -> str:

@@ -19,6 +19,7 @@ from typer.exceptions import Abort, Exit, TyperException
 
 from schemas.problem import ExitCode, Problem
 from services.cli import (
+    bench,
     build,
     dataset,
     datasets,
@@ -51,6 +52,7 @@ app = typer.Typer(
 app.command("build")(build.build)
 app.command("render")(render.render)
 app.command("dump")(dump.dump)
+app.command("bench")(bench.bench)
 app.add_typer(scene.app, name="scene")
 app.command("samples")(samples.samples)
 app.command("stress")(stress.stress)

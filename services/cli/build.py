@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from schemas.tail import DENSITY_G
+from schemas.network import DEFAULT_NETWORK
+from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAIL_HELP
 from services.cli import output
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
 
@@ -33,17 +34,25 @@ def build(
         int, typer.Option("--views-per-scene", help="Views sampled of a scene that has no cameras.")
     ] = 3,
     size: Annotated[str, typer.Option("--size", help="Width and height of the pictures, pixels.")] = "1430x960",
-    tail: Annotated[
-        str, typer.Option("--tail", help="density, exact-coverage, weighted-average or paper.")
-    ] = "density",
+    tail: Annotated[str, typer.Option("--tail", help=TAIL_HELP)] = DEFAULT_TAIL,
     g: Annotated[float, typer.Option("--g", help="Steepness of the density tail.")] = DENSITY_G,
     seed: Annotated[int, typer.Option("--seed", help="Seed of everything drawn at random.")] = 0,
     steps: Annotated[int | None, typer.Option("--steps", help="Optimiser steps. Default: the trainer's.")] = None,
+    network: Annotated[str, typer.Option("--network", help="Size: tiny, small or full.")] = DEFAULT_NETWORK,
+    patience: Annotated[
+        int, typer.Option("--patience", help="Stop after so many validations without a better score; 0: never.")
+    ] = 0,
+    start: Annotated[
+        str | None, typer.Option("--from", help="Bundle to begin with: a folder, or NAME@ALIAS of the registry.")
+    ] = None,
+    replay: Annotated[
+        Path | None, typer.Option("--replay", help="Data set that --from must not forget. Default: that of its name.")
+    ] = None,
     state: StateOption = DEFAULT_STATE,
     as_json: JsonOption = False,
 ) -> None:
     """Render, label, train, evaluate, publish and report. The same command again continues, or finds it all done."""
-    from services.options import BuildOptions, parse_budgets, parse_size, parse_tail
+    from services.options import BuildOptions, parse_budgets, parse_network, parse_size, parse_tail
     from services.progress import make_progress
 
     width, height = parse_size(size)
@@ -61,6 +70,10 @@ def build(
         g=g,
         seed=seed,
         steps=steps,
+        network=parse_network(network),
+        patience=patience,
+        start=start,
+        replay=replay,
         state=state,
     )
     # The pipeline loads torch and numba: only once the options are known to be good.

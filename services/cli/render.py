@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from schemas.tail import DENSITY_G
+from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAIL_HELP
 from services.cli import output
 from services.cli.lines import size
 from services.cli.scene_options import (
@@ -45,8 +45,8 @@ def render(
     ] = None,
     budget: Annotated[float, typer.Option("--budget", help="Fragments, as a multiple of width x height.")] = 2.0,
     tail: Annotated[
-        str, typer.Option("--tail", help="density, exact-coverage, weighted-average or paper.")
-    ] = "density",
+        str | None, typer.Option("--tail", help=f"{TAIL_HELP} Default: the bundle's, or {DEFAULT_TAIL}.")
+    ] = None,
     g: Annotated[float, typer.Option("--g", help="Steepness of the density tail.")] = DENSITY_G,
     bundle: Annotated[
         str | None, typer.Option("--bundle", help="For kbuffer-deep: a folder, or NAME@ALIAS of the registry.")
@@ -103,7 +103,7 @@ def render(
         techniques=parse_techniques(techniques or (), bundle is not None),
         needs=parse_needs(vkb, inference, nodes, samples),
         budget=budget,
-        tail=parse_tail(tail),
+        tail=None if tail is None else parse_tail(tail),
         g=g,
         bundle=bundle,
         camera=camera,

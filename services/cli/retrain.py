@@ -19,6 +19,7 @@ from services.cli.state import JsonOption
 from services.cli.submit import (
     AlphaOption,
     BudgetsOption,
+    NetworkOption,
     PriorityOption,
     SeedOption,
     SizeOption,
@@ -60,6 +61,7 @@ def retrain(
     tail: TailOption = None,
     g: SteepnessOption = None,
     seed: SeedOption = None,
+    network: NetworkOption = None,
     steps: StepsOption = None,
     priority: PriorityOption = None,
     url: UrlOption = DEFAULT_URL,
@@ -79,6 +81,7 @@ def retrain(
         tail=tail,
         g=g,
         seed=seed,
+        network=network,
         steps=steps,
         priority=priority,
     )

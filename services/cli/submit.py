@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from schemas.problem import Problem
+from schemas.tail import TAIL_HELP
 from services.cli import output
 from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption, connect
 from services.cli.state import JsonOption
@@ -26,9 +27,10 @@ ViewsPerSceneOption = Annotated[
     int | None, typer.Option("--views-per-scene", help="Views sampled of a scene that has no cameras.")
 ]
 SizeOption = Annotated[str | None, typer.Option("--size", help="Width and height of the pictures, pixels: 1430x960.")]
-TailOption = Annotated[str | None, typer.Option("--tail", help="density, exact-coverage, weighted-average or paper.")]
+TailOption = Annotated[str | None, typer.Option("--tail", help=TAIL_HELP)]
 SteepnessOption = Annotated[float | None, typer.Option("--g", help="Steepness of the density tail.")]
 SeedOption = Annotated[int | None, typer.Option("--seed", help="Seed of everything drawn at random.")]
+NetworkOption = Annotated[str | None, typer.Option("--network", help="Size of the network: tiny, small or full.")]
 StepsOption = Annotated[int | None, typer.Option("--steps", help="Optimiser steps.")]
 PriorityOption = Annotated[str | None, typer.Option("--priority", help="low, normal or high.")]
 
@@ -53,6 +55,7 @@ def submit(
     tail: TailOption = None,
     g: SteepnessOption = None,
     seed: SeedOption = None,
+    network: NetworkOption = None,
     steps: StepsOption = None,
     start_from: Annotated[str | None, typer.Option("--start-from", help="Weights: scratch or champion.")] = None,
     promote: Annotated[str | None, typer.Option("--promote", help="if-better or never.")] = None,
@@ -78,6 +81,7 @@ def submit(
         tail=tail,
         g=g,
         seed=seed,
+        network=network,
         steps=steps,
         priority=priority,
     )
@@ -101,13 +105,15 @@ def submit(
     ensure_success(job)
 
 
-def job_fields(*, budgets: str | None, size: str | None, tail: str | None, **plain_fields: Any) -> dict[str, Any]:
+def job_fields(
+    *, budgets: str | None, size: str | None, tail: str | None, network: str | None, **plain_fields: Any
+) -> dict[str, Any]:
     """Fields of a job from options; what was not given is left to the server's defaults.
 
     Raises:
         Problem: An option cannot be read.
     """
-    from services.options import parse_budgets, parse_size, parse_tail
+    from services.options import parse_budgets, parse_network, parse_size, parse_tail
 
     fields = {name: value for name, value in plain_fields.items() if value is not None}
     if budgets is not None:
@@ -116,6 +122,8 @@ def job_fields(*, budgets: str | None, size: str | None, tail: str | None, **pla
         fields["width"], fields["height"] = parse_size(size)
     if tail is not None:
         fields["tail"] = parse_tail(tail)
+    if network is not None:
+        fields["network"] = parse_network(network)
     return fields
 
 

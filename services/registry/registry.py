@@ -352,7 +352,7 @@ class Registry:
 
     def _parity_holds(self, publication: Publication) -> bool:
         parity = self._manifest(self._row(publication)).parity
-        return max(parity.torch_onnx, parity.torch_glsl) <= parity.tolerance
+        return parity.worst <= parity.tolerance
 
 
 def open_registry(database: Database, blobs: Blobs, settings: Settings) -> Registry:

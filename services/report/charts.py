@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -79,42 +79,69 @@ def pareto_front(points: Sequence[tuple[float, float]]) -> list[tuple[float, flo
     return front
 
 
-def time_error_chart(rows: Sequence[Row], label: str) -> str:
-    """Wall time against mse (x1e-5) on log axes, a point for every technique and budget.
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """What an error is set against.
+
+    Attributes:
+        of: The cost of a row; None: not measured.
+        axis: Label of the axis, and what a screen reader says.
+        unit: Of the values.
+    """
+
+    of: Callable[[Row], float | None]
+    axis: str
+    unit: str
+
+
+TIME = Cost(lambda row: row.ms, "wall time of a frame", "ms")
+MEMORY = Cost(lambda row: row.total_bytes and row.total_bytes / 2**20, "memory of all buffers", "MiB")
+
+
+def error_chart(rows: Sequence[Row], label: str, cost: Cost = TIME) -> str:
+    """A cost against mse (x1e-5) on log axes, a point for every technique and budget.
 
     The dashed line is the Pareto front of the techniques that a renderer can run, so without the oracle.
 
-    The exact picture, whose error no logarithmic axis can show, is a vertical line at its time.
+    The exact picture, whose error no logarithmic axis can show, is a vertical line at its cost.
 
-    Rows without time or error are left out; '' if none is left.
+    Rows without cost or error are left out; '' if none is left.
     """
-    points = {(r.technique, r.budget_factor): (r.ms, r.mse * 1e5) for r in rows if r.ms and r.mse}
+    points = {(r.technique, r.budget_factor): (x, r.mse * 1e5) for r in rows if (x := cost.of(r)) and r.mse}
     if not points:
         return ""
     xs, ys = [x for x, _ in points.values()], [y for _, y in points.values()]
-    exact = [r.ms for r in rows if r.technique == EXACT and r.ms]
+    exact = [x for r in rows if r.technique == EXACT and (x := cost.of(r))]
     frame = Frame(_padded_log([*xs, *exact], 1.35), _padded_log(ys, 1.8))
-    real = [point for (technique, _), point in points.items() if technique != ORACLE]
-    parts = [_axes(frame, "wall time of a frame, ms", "MSE ×1e-5"), _front(frame, pareto_front(real))]
-    parts += [_exact_line(frame, ms) for ms in exact]
+    real = [point for (technique, _), point in points.items() if technique.partition(" ")[0] != ORACLE]
+    parts = [_axes(frame, f"{cost.axis}, {cost.unit}", "MSE ×1e-5"), _front(frame, pareto_front(real))]
+    parts += [_exact_line(frame, x, cost) for x in exact]
     for technique in technique_order(name for name, _ in points):
         own = sorted((budget, *points[name, budget]) for name, budget in points if name == technique)
-        parts.append(_series(frame, technique, own))
-    return _svg(frame, parts, f"{label}: wall time of a frame against mean squared error, by technique and budget")
+        parts.append(_series(frame, technique, own, cost))
+    return _svg(frame, parts, f"{label}: {cost.axis} against mean squared error, by technique and budget")
+
+
+def loss_chart(points: Sequence[tuple[int, float]]) -> str:
+    """Loss of batches by step; '' with fewer than two points."""
+    return _by_step([(float(step), loss) for step, loss in points], "loss", "Loss of a batch, by training step")
 
 
 def training_chart(history: Sequence[TrainingPoint]) -> str:
     """Error over the optimum on the training views, by step; '' with fewer than two points."""
-    if len(history) < 2:
-        return ""
     points = [(float(p.step), p.over_optimum) for p in history]
+    return _by_step(points, "error / optimum", "Squared error over the optimum's, by training step")
+
+
+def _by_step(points: Sequence[tuple[float, float]], what: str, description: str) -> str:
+    if len(points) < 2:
+        return ""
     values = [y for _, y in points]
     steps = (points[0][0], max(points[-1][0], points[0][0] + 1.0))
     span = (max(values) - min(values)) or max(abs(values[0]), 1.0)
     heights = (min(values) - 0.05 * span, max(values) + 0.05 * span)
     frame = Frame(steps, heights, log_x=False, log_y=False, width=640.0, height=280.0)
-    parts = [_axes(frame, "step", "error / optimum"), _line(frame, points, "line training")]
-    return _svg(frame, parts, "Squared error over the optimum's, by training step")
+    return _svg(frame, [_axes(frame, "step", what), _line(frame, points, "line training")], description)
 
 
 def legend(techniques: Sequence[str]) -> str:
@@ -130,21 +157,23 @@ def _key(css: str, width: int, drawing: str, text: str) -> str:
     return f'<span class="key">{svg}{escape(text)}</span>'
 
 
-def _series(frame: Frame, technique: str, points: Sequence[tuple[float, float, float]]) -> str:
+def _series(frame: Frame, technique: str, points: Sequence[tuple[float, float, float]], cost: Cost) -> str:
     path = " ".join(f"{frame.px(x):.1f},{frame.py(y):.1f}" for _, x, y in points)
     marks = "".join(
         f'<g class="mark">{_mark(technique, frame.px(x), frame.py(y))}'
-        f"<title>{escape(title(technique))}, F = {budget:g} W H: {number(x)} ms, {number(y)}e-5</title></g>"
-        f'<text class="point" x="{frame.px(x) + 8:.1f}" y="{frame.py(y) - 6:.1f}">{budget:g}</text>'
+        f"<title>{escape(title(technique))}{f', F = {budget:g} W H' if budget else ''}: "
+        f"{number(x)} {cost.unit}, {number(y)}e-5</title></g>"
+        f'<text class="point" x="{frame.px(x) + 8:.1f}" y="{frame.py(y) - 6:.1f}">'
+        f"{f'{budget:g}' if budget else escape(title(technique))}</text>"
         for budget, x, y in points
     )
     return f'<g class="t-{escape(technique)}"><polyline class="link" points="{path}"/>{marks}</g>'
 
 
-def _exact_line(frame: Frame, ms: float) -> str:
-    x = frame.px(ms)
+def _exact_line(frame: Frame, value: float, cost: Cost) -> str:
+    x = frame.px(value)
     line = f'<path class="exact" d="M{x:.1f} {frame.top}V{frame.height - frame.bottom}"/>'
-    return f'<g class="mark">{line}<title>exact: {number(ms)} ms</title></g>' + _text(
+    return f'<g class="mark">{line}<title>exact: {number(value)} {cost.unit}</title></g>' + _text(
         "point", "start", x + 4, frame.top + 10, "exact"
     )
 

@@ -47,7 +47,7 @@ def write_report(path: Path, data: ReportData, pictures: Iterable[PictureSet] = 
     measured = [m for m in data.measurements if m.scene in held_out]
     trained = [m for m in data.measurements if m.scene not in held_out]
     html = (
-        _environment()
+        environment()
         .get_template("report.html.j2")
         .render(
             data=data,
@@ -81,7 +81,7 @@ def _section(heading: str, measurements: Sequence[Measurement]) -> Section:
             if value is not None:
                 key = (row.budget_factor, column)
                 best[key] = min(value, best.get(key, value))
-    return Section(heading, rows, charts.time_error_chart(rows, heading), best)
+    return Section(heading, rows, charts.error_chart(rows, heading), best)
 
 
 def _not_run(measurements: Sequence[Measurement]) -> list[tuple[str, int]]:
@@ -90,16 +90,17 @@ def _not_run(measurements: Sequence[Measurement]) -> list[tuple[str, int]]:
     return sorted({reason: reasons.count(reason) for reason in reasons}.items())
 
 
-def _environment() -> Environment:
-    environment = Environment(
+def environment() -> Environment:
+    """Templates with the filters that pages share."""
+    made = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters.update(number=summary.number, technique=summary.title, mib=_mib, count=_count)
-    return environment
+    made.filters.update(number=summary.number, technique=summary.title, mib=_mib, count=_count)
+    return made
 
 
 def _mib(size: int | None) -> str:

@@ -133,8 +133,10 @@ def _flip_strip(shown: Mapping[str, Picture], where: str) -> Strip:
     cells: list[Cell | None] = [None]
     for name, picture in shown.items():
         caption = f"mean {float(picture.flip.mean()):.3g}"
-        cells.append(_map_cell(picture.flip, colours.HEAT, f"{title(name)}: FLIP", caption, where))
-    return Strip("FLIP at 67.02 pixels per degree", cells, colours.css_gradient(colours.HEAT), "0", "1")
+        # Most errors are small: on a linear scale a map whose mean is .02 is black.
+        cells.append(_map_cell(np.sqrt(picture.flip), colours.HEAT, f"{title(name)}: FLIP", caption, where))
+    heading = "FLIP at 67.02 pixels per degree, square-root scale"
+    return Strip(heading, cells, colours.css_gradient(colours.HEAT), "0", "1")
 
 
 def _count_strip(shown: Mapping[str, Picture], where: str) -> Strip:

@@ -36,10 +36,9 @@ def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
     description = _description(task, load_facts(trained), len(shards))
     bundle = folder / BUNDLE
     manifest = export_bundle(bundle, weights, description, _parity_inputs(shards), gl_context())
-    worst = max(manifest.parity.torch_onnx, manifest.parity.torch_glsl)
-    report(1.0, f"{manifest.parity.count:,} inputs, largest difference {worst:.1e}")
+    report(1.0, f"{manifest.parity.count:,} inputs, largest difference {manifest.parity.worst:.1e}")
     files = {path.name: file_sha256(path) for path in sorted(bundle.iterdir())}
-    save_facts(folder, {"digest": bundle_digest(bundle), "files": files, "parity": worst})
+    save_facts(folder, {"digest": bundle_digest(bundle), "files": files, "parity": manifest.parity.worst})
 
 
 def _description(task: Task, trained: Facts, views: int) -> Description:

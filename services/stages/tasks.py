@@ -30,16 +30,18 @@ _SOURCES: Mapping[StageName, tuple[str, ...]] = {
         "services.stages.render",
     ),
     "label": (
-        *("labeller", "renderer.allocation", "renderer.features", "renderer.dump"),
+        *("labeller", "renderer.allocation", "renderer.features", "renderer.depth_bins", "renderer.dump"),
         *("schemas.tail", "schemas.colour", "schemas.skips"),
         "services.stages.label",
     ),
     "train": (
-        *(f"trainer.{name}" for name in ("checkpoint", "dataset", "evaluate", "loss", "models", "train", "weights")),
+        *(f"trainer.{name}" for name in ("adam", "checkpoint", "config", "dataset", "evaluate", "heads", "loss")),
+        *(f"trainer.{name}" for name in ("models", "paper", "sgd", "train", "views", "weights")),
         "services.stages.train",
     ),
     "export": (
-        *(f"trainer.{name}" for name in ("bundle", "export_glsl", "export_onnx", "glsl_network", "parity")),
+        *(f"trainer.{name}" for name in ("bundle", "dialects", "export_forms", "export_onnx", "export_shader")),
+        *(f"trainer.{name}" for name in ("export_ubo", "glsl_network", "half", "parity", "prune", "self_test")),
         "renderer.onnx_network",
         "schemas.bundle",
         "services.stages.export",
@@ -48,7 +50,16 @@ _SOURCES: Mapping[StageName, tuple[str, ...]] = {
         *("labeller.curves", "labeller.curve_kernels"),
         *(
             f"renderer.{name}"
-            for name in ("allocation", "features", "metrics", "onnx_network", "screen", "shaders", "techniques")
+            for name in (
+                "allocation",
+                "depth_bins",
+                "features",
+                "metrics",
+                "onnx_network",
+                "screen",
+                "shaders",
+                "techniques",
+            )
         ),
         *(f"services.stages.{name}" for name in ("evaluate", "shots", "pictures")),
     ),
@@ -121,15 +132,19 @@ def train_task(
     """Trains the network.
 
     Args:
-        plan: Seed and steps.
+        plan: Seed, steps, size of the network, patience, and what is replayed.
         shards: Digest of the asset and label artifact of every training view: an asset's label decides which views are
             weighted together, so it belongs to the key.
         start: Bundle whose weights the training begins with.
         config: Further settings of the trainer.
     """
-    params: dict[str, Any] = {"seed": plan.seed, "steps": plan.steps, **(config or {})}
+    params: dict[str, Any] = {"seed": plan.seed, "steps": plan.steps, "network": plan.network, **(config or {})}
+    if plan.patience:
+        params["patience"] = plan.patience
     if start is not None:
         params["start"] = start.digest
+    if plan.replay is not None:
+        params["replay"] = plan.replay.digest
     return Task(
         name=plan.name,
         stage="train",
@@ -138,6 +153,7 @@ def train_task(
         params=params,
         needs=tuple(artifact for _, artifact in shards),
         bundle=start,
+        replay=plan.replay,
     )
 
 

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
+from typing import Any
 
+from labeller.dataset import open_dataset
 from schemas.bundle import WEIGHTS
 from schemas.measurement import TrainingPoint
+from services.report.live import write_live
 from services.stages.desk import SHARD, Desk, save_facts
-from services.tasks import Report, Task
+from services.tasks import Report, Source, Task
 from trainer.bundle import load_bundle
-from trainer.dataset import load_shards
+from trainer.log import read_log
 from trainer.train import TrainConfig, train
+from trainer.views import ShardView, open_views
 from trainer.weights import save_weights
 
 FINE_TUNING = 0.25
 """Learning rate of a training that begins with a champion's weights, as a multiple of the usual one: the full rate
 throws away what they know within its first steps."""
+
+LOG = "log.jsonl"
+"""File of a `train` artifact: how the training went, a JSON object a line (`trainer.log`)."""
 
 
 def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
@@ -24,25 +32,48 @@ def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
     Raises:
         Problem: There is nothing to learn from.
     """
-    config = TrainConfig(seed=task.params["seed"])
-    if task.params["steps"] is not None:
-        config = config.model_copy(update={"steps": task.params["steps"]})
-    if task.bundle is not None:
-        config = config.model_copy(update={"lr": FINE_TUNING * config.lr})
+    config = _config(task)
     shards = [desk.store.fetch(need) / SHARD for need in task.needs]
-    data = load_shards(shards, [asset.partition(":")[0] for asset in task.inputs])
+    views = open_views(shards, [asset.partition(":")[0] for asset in task.inputs])
+    replay = [] if task.replay is None else _replayed(task.replay)
     start = None if task.bundle is None else load_bundle(desk.bundle(task)).weights
     checkpoint = desk.checkpoint(task)
+    log, page = checkpoint.with_suffix(".jsonl"), checkpoint.with_name(f"{task.name}.html")
 
     def progress(step: int, steps: int, loss: float, score: float) -> None:
         report(step / steps, f"step {step}: loss {loss:.3f}, error / optimum {score:.2f}")
+        write_live(page, task.name, read_log(log), steps)
 
     # No held-out view has a say in which state is kept: they are for the evaluation alone.
-    result = train(data, (), config, progress, checkpoint, start)
+    result = train(views, (), config, progress, checkpoint, start, replay, log)
     save_weights(folder / WEIGHTS, result.weights)
+    write_live(page, task.name, read_log(log), config.steps, is_over=True)
     history = [
         TrainingPoint(step=point.step, loss=point.loss, over_optimum=point.score).model_dump()
         for point in result.history
     ]
-    save_facts(folder, {"history": history, "config": config.model_dump(mode="json")})
+    facts = {"history": history, "config": config.model_dump(mode="json"), "kept_out": list(result.kept_out)}
+    save_facts(folder, facts)
+    if log.exists():
+        shutil.copyfile(log, folder / LOG)
     checkpoint.unlink(missing_ok=True)
+    log.unlink(missing_ok=True)
+
+
+def _config(task: Task) -> TrainConfig:
+    given: dict[str, Any] = {"seed": task.params["seed"], "patience": task.params.get("patience", 0)}
+    if task.params["steps"] is not None:
+        given["steps"] = task.params["steps"]
+    config = TrainConfig.sized(task.params["network"], **given)
+    return config if task.bundle is None else config.model_copy(update={"lr": FINE_TUNING * config.lr})
+
+
+def _replayed(source: Source) -> list[ShardView]:
+    """The views of an earlier data set, assets named by the content of their scenes."""
+    dataset = open_dataset(Path(source.folder or ""))
+    entries = [entry for entry in dataset.index.shards if source.files.get(entry.file) == entry.header_sha256]
+    return open_views(
+        [dataset.folder / entry.file for entry in entries],
+        [entry.source.scene for entry in entries],
+        [entry.header_sha256 for entry in entries],
+    )

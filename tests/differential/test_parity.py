@@ -12,24 +12,25 @@ from support.training import random_weights, real_features
 
 from renderer.features import FEATURES
 from renderer.onnx_network import OnnxNetwork
-from schemas.bundle import FEATURE_LIMIT, GLSL, ONNX
+from schemas.bundle import FEATURE_LIMIT, GLSL, GLSL_HALF, HEADS, ONNX, UBO_HALF, HeadName, OutputName
 from schemas.problem import Problem
-from trainer.export_glsl import glsl_source
+from trainer.export_forms import float_forms, half_forms
 from trainer.export_onnx import OPSET, onnx_model
+from trainer.export_shader import shader_source
 from trainer.glsl_network import CHUNK, glsl_outputs
 from trainer.parity import check, torch_outputs
 from trainer.weights import Weights
 
 
 def write(folder: Path, weights: Weights) -> Path:
-    (folder / ONNX).write_bytes(onnx_model(weights))
-    (folder / GLSL).write_text(glsl_source(weights))
+    for name, content in {**float_forms(weights), **half_forms(weights)}.items():
+        (folder / name).write_bytes(content)
     return folder
 
 
 @pytest.mark.parametrize(
     ("features", "hidden"),
-    [(FEATURES, (32, 16)), (FEATURES[::3], (16,)), (("depth_std",), ()), (FEATURES[::-1], (8, 8, 8))],
+    [(FEATURES[:26], (32, 16)), (FEATURES[::3], (16,)), (("depth_std",), ()), (FEATURES[::-1], (8, 8, 8))],
 )
 def test_all_forms_agree(
     gl: moderngl.Context, tmp_path: Path, features: tuple[str, ...], hidden: tuple[int, ...]
@@ -38,10 +39,34 @@ def test_all_forms_agree(
     inputs = real_features(100_000, 1)
     report = check(weights, write(tmp_path, weights), inputs, gl)
     assert report.count == 100_000
-    assert max(report.torch_onnx, report.torch_glsl) <= 1e-5
+    assert 0.0 < report.worst <= 1e-5
+    assert set(report.half) == {GLSL_HALF, UBO_HALF}
+    assert max(report.half.values()) <= 2e-3
+    assert report.half_holds
     truth = torch_outputs(weights, inputs[:, weights.columns])
     in_numpy = np.stack(weights.predict(inputs), axis=1)
     assert (np.abs(in_numpy - truth) / np.maximum(1.0, np.abs(truth))).max() <= 1e-5
+
+
+@pytest.mark.parametrize(("head", "outputs"), [(head, last) for head, (*_, last) in HEADS.items()])
+def test_every_head_agrees(
+    gl: moderngl.Context, tmp_path: Path, head: HeadName, outputs: tuple[OutputName, ...]
+) -> None:
+    weights = random_weights(2, FEATURES[:5], (6, 5), head, outputs)
+    report = check(weights, write(tmp_path, weights), real_features(2000, 1), gl)
+    assert report.worst <= 1e-5
+    assert report.half_holds
+    answers = OnnxNetwork(tmp_path / ONNX).run(np.zeros((3, 5), np.float32))
+    assert answers.shape == (3, len(outputs))
+
+
+def test_float16_that_overflows_is_a_number_that_json_has(gl: moderngl.Context, tmp_path: Path) -> None:
+    weights = random_weights(2, FEATURES[:5], (6,))
+    weights.layers[0][0][:] *= np.float32(3e4)
+    weights.layers[1][0][:] /= np.float32(3e4)
+    report = check(weights, write(tmp_path, weights), real_features(2000, 1), gl)
+    assert report.float16 == 1e30
+    assert not report.half_holds
 
 
 def test_any_number_of_rows_works(gl: moderngl.Context, tmp_path: Path) -> None:
@@ -96,23 +121,12 @@ def test_the_onnx_file_is_as_promised() -> None:
     assert all(tensor.data_location == onnx.TensorProto.DEFAULT for tensor in model.graph.initializer)
 
 
-def test_glsl_literals_are_exact() -> None:
-    values = np.array([1.0, -1.0, 1e-8, 16777216.0, 0.1, -3.4e38, 1e-38], np.float32)
-    layer = (np.stack([values, values]), np.zeros(2, np.float32))
-    names = FEATURES[: len(values)]
-    weights = Weights(names, np.zeros(len(values), np.float32), np.ones(len(values), np.float32), (layer,))
-    line = next(line for line in glsl_source(weights).splitlines() if "float a =" in line)
-    written = [term.split(" * ")[0].strip("()") for term in line.removesuffix(";").split(" = ")[1].split(" + ")[1:]]
-    np.testing.assert_array_equal(np.array(written, np.float64).astype(np.float32), values)
-    assert all("." in text and "e" in text for text in written), "a literal without either would be an int"
-
-
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_weights_that_are_not_finite_have_no_glsl(value: float) -> None:
     weights = random_weights(0)
     weights.layers[1][0][0, 0] = value
     with pytest.raises(ValueError, match="not finite"):
-        glsl_source(weights)
+        shader_source(weights)
 
 
 def test_a_difference_is_refused(ctx: moderngl.Context, tmp_path: Path) -> None:

@@ -40,7 +40,7 @@ def refused(found: Sequence[Row]) -> list[Row]:
             {"curves", "curves.weights", "curves.by_g", "composite", "reference", "transmittance", "csr"}
             | {"transmittance.float32", "transmittance.rejected"},
         ),
-        ("fills", {"fill.limits", "fill.budget", "fill.lambda", "fill.order", "sum", "sum.rejected"}),
+        ("fills", {"fill.limits", "fill.budget", "fill.lambda", "fill.lattice", "fill.order", "sum", "sum.rejected"}),
         ("features", {"features.gather", "features.derive", "features.spread"}),
     ],
 )

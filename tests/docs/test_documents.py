@@ -17,7 +17,15 @@ from services.cli.app import app
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("schemas", "renderer", "labeller", "trainer", "services")
-DOCUMENTS = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "deploy/README.md", "docs/SERVICE.md")
+DOCUMENTS = (
+    "README.md",
+    "ARCHITECTURE.md",
+    "CONTRIBUTING.md",
+    "SECURITY.md",
+    "deploy/README.md",
+    "docs/SERVICE.md",
+    "docs/BUNDLE.md",
+)
 
 DISTRIBUTIONS = {
     "OpenEXR": "openexr",

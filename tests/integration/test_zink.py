@@ -1,10 +1,13 @@
-"""Every technique again on zink over lavapipe, which has the 64-bit atomics of the one-pass chain and needs no GPU.
+"""Every technique, and the allocation on the GPU, again on zink over lavapipe.
+
+It has the 64-bit atomics of the one-pass chain and needs no GPU.
 
 A process has one context, so they run in another one.
 """
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -18,7 +21,7 @@ ONE_PASS = "tests/differential/test_chain_one_pass.py"
 TECHNIQUES = sorted(
     path.relative_to(ROOT).as_posix()
     for path in (ROOT / "tests" / "differential").glob("test_*.py")
-    if "from renderer.techniques" in path.read_text(encoding="utf-8")
+    if re.search(r"^from renderer\.(techniques|allocation\.gpu)", path.read_text(encoding="utf-8"), re.MULTILINE)
 )
 
 pytestmark = pytest.mark.skipif(

@@ -63,7 +63,7 @@ def plain_features(dump: FragmentDump) -> NDArray[np.float64]:
                 f"rgb_std_{c}": colour[:, i].std(),
                 f"rgb_depth_cov_{c}": ((colour[:, i] - colour[:, i].mean()) * (x - x.mean())).mean(),
             }
-        out[p] = [values[name] for name in FEATURES]
+        out[p] = [values.get(name, 0.0) for name in FEATURES]  # without depth bins there are no shares in front
     return out
 
 

@@ -4,7 +4,7 @@ import flip_evaluator
 import numpy as np
 import pytest
 
-from renderer.metrics import PIXELS_PER_DEGREE, flip, mse, psnr
+from renderer.metrics import PIXELS_PER_DEGREE, flip, mse, psnr, ssim
 
 RNG = np.random.default_rng(5)
 REFERENCE = RNG.integers(0, 256, (120, 160, 3)).astype(np.uint8)
@@ -52,3 +52,36 @@ def test_mse_is_the_mean_over_pixels_and_channels_in_unit_range() -> None:
 def test_pictures_of_different_sizes_are_refused() -> None:
     with pytest.raises(ValueError, match="one size"):
         flip(REFERENCE[1:], REFERENCE)
+
+
+def plain_ssim(test: np.ndarray, reference: np.ndarray) -> float:
+    """Equation 13 of Wang et al. 2004, window by window."""
+    grey = [image.astype(np.float64) @ (0.299, 0.587, 0.114) for image in (test, reference)]
+    line = np.exp(-0.5 * ((np.arange(11) - 5) / 1.5) ** 2)
+    weight = np.outer(line, line) / line.sum() ** 2
+    found = []
+    for row in range(test.shape[0] - 10):
+        for column in range(test.shape[1] - 10):
+            x, y = (image[row : row + 11, column : column + 11] for image in grey)
+            mx, my = (weight * x).sum(), (weight * y).sum()
+            vx, vy = (weight * (x - mx) ** 2).sum(), (weight * (y - my) ** 2).sum()
+            cov = (weight * (x - mx) * (y - my)).sum()
+            c1, c2 = 2.55**2, 7.65**2
+            found.append((2 * mx * my + c1) * (2 * cov + c2) / ((mx**2 + my**2 + c1) * (vx + vy + c2)))
+    return float(np.mean(found))
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns"), [(slice(20, 24), slice(30, 33)), (slice(0, 2), slice(38, 40)), (slice(None), slice(None))]
+)
+def test_ssim_is_that_of_its_definition(rows: slice, columns: slice) -> None:
+    reference, test = REFERENCE[:50, :40], changed(rows, columns)[:50, :40]
+    assert ssim(test, reference) == pytest.approx(plain_ssim(test, reference), abs=1e-12)
+    assert ssim(test, reference) == pytest.approx(ssim(reference, test), abs=1e-12)
+    assert ssim(test, reference) < 1.0
+
+
+def test_equal_pictures_are_similar_and_small_ones_refused() -> None:
+    assert ssim(REFERENCE, REFERENCE) == 1.0
+    with pytest.raises(ValueError, match="one size"):
+        ssim(REFERENCE[:10], REFERENCE[:10])

@@ -42,6 +42,8 @@ def test_budgets_are_sorted_and_unique(scenes: tuple[Path, ...]) -> None:
         ({"g": float("nan")}, "--g nan"),
         ({"seed": -1}, "--seed -1"),
         ({"steps": 0}, "--steps 0"),
+        ({"patience": -1}, "--patience -1"),
+        ({"replay": Path("datasets/glass")}, "--replay needs --from"),
         ({"name": "Glass!"}, "'Glass!' cannot be the name"),
         ({"holdout": (Path("teapot"),)}, "teapot is not among the scenes"),
         ({"views": Path("nowhere.json")}, "no views file nowhere.json"),

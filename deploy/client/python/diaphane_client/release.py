@@ -22,7 +22,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 from diaphane_client.errors import Refused
 
 STATEMENT_FORMAT: Final = "diaphane-release/1"
-BUNDLE_FORMAT: Final = "diaphane-bundle/1"
+BUNDLE_FORMATS: Final = ("diaphane-bundle/1", "diaphane-bundle/2")
 MANIFEST: Final = "manifest.json"
 
 MAX_RECORD_BYTES: Final = 1 << 20
@@ -144,7 +144,7 @@ def check_manifest(content: bytes, release: Release) -> None:
     """
     try:
         manifest = json.loads(content)
-        fits = manifest["format"] == BUNDLE_FORMAT and {
+        fits = manifest["format"] in BUNDLE_FORMATS and {
             **_files(manifest["files"]),
             MANIFEST: release.files[MANIFEST],
         } == dict(release.files)

@@ -51,7 +51,7 @@ def test_the_pareto_front_is_what_nothing_dominates(points: list[tuple[int, int]
 
 
 def test_the_scatter_has_a_point_for_every_technique_and_budget() -> None:
-    svg = ElementTree.fromstring(charts.time_error_chart(rows(example()), "bottles"))
+    svg = ElementTree.fromstring(charts.error_chart(rows(example()), "bottles"))
     titles = [element.text for element in svg.iter("title")]
     assert len(titles) == 8
     assert "this bundle, F = 2 W H: 20.0 ms, 1.00e-5" in titles
@@ -72,18 +72,18 @@ def test_the_oracle_is_not_on_the_front() -> None:
         measurement("kbuffer-deep", 2e-5, total_ms=20.0),
         measurement("kbuffer-optimal", 1e-5, total_ms=30.0),
     ]
-    svg = ElementTree.fromstring(charts.time_error_chart(rows(measured), "bottles"))
+    svg = ElementTree.fromstring(charts.error_chart(rows(measured), "bottles"))
     (front,) = [element for element in svg.iter("polyline") if element.get("class") == "front"]
     assert len((front.get("points") or "").split()) == 2
 
 
 def test_rows_without_times_make_no_scatter() -> None:
-    assert charts.time_error_chart(rows([measurement(total_ms=None)]), "bottles") == ""
-    assert charts.time_error_chart(rows([measurement(mse=0.0, exact=True)]), "bottles") == ""
+    assert charts.error_chart(rows([measurement(total_ms=None)]), "bottles") == ""
+    assert charts.error_chart(rows([measurement(mse=0.0, exact=True)]), "bottles") == ""
 
 
 def test_one_point_is_drawn_too() -> None:
-    ElementTree.fromstring(charts.time_error_chart(rows([measurement()]), "bottles & <glass>"))
+    ElementTree.fromstring(charts.error_chart(rows([measurement()]), "bottles & <glass>"))
 
 
 @pytest.mark.parametrize("losses", [(1.0, 0.5, 0.4), (0.0, 0.0), (1.0, 1.0)])
@@ -102,6 +102,6 @@ def test_the_exact_technique_is_a_line_at_its_time() -> None:
     exact = [m.model_copy(update={"technique": "sbuffer", "exact": True, "mse": 0.0}) for m in example()[:1]]
     made = rows([*example(), *exact])
     assert [row.technique for row in made].count("sbuffer") == 1
-    svg = ElementTree.fromstring(charts.time_error_chart(made, "all"))
+    svg = ElementTree.fromstring(charts.error_chart(made, "all"))
     assert [path for path in svg.iter("path") if path.get("class") == "exact"]
     assert not [group for group in svg.iter("g") if group.get("class") == "t-sbuffer"]

@@ -1,0 +1,118 @@
+"""The suite's results as a page that reads like a paper's evaluation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from benchmarks.comparing import tables
+from schemas.bench import BenchResult, BenchView
+from services.bench.bars import error_bars
+from services.bench.groups import Group, groups_of
+from services.bench.page import said_machine
+
+PAPER = ("minecraft_village_caves", 2.0), ("sponza", 4.0)
+"""DHOIT's two rows of Tables 1 and 2: Vokselia Spawn at M = 20 MB, here another voxel scene at F = 2 WH, and Crytek
+Sponza at 40 MB, F = 4 WH."""
+FACTORS = (2.0, 4.0)
+"""Of Figure 6."""
+
+
+def page(found: Mapping[str, BenchResult], drawn: Mapping[tuple[str, str], str]) -> str:
+    """Markdown.
+
+    Args:
+        found: Driver -> its results.
+        drawn: (driver, figure) -> its file, relative to the page.
+    """
+    parts = [
+        "# Every technique, measured\n",
+        "`make bench` measures what is missing and writes this page; it can be stopped and goes on. "
+        "`python -m benchmarks.suite --help` has its parts: single scenes, sizes, opacities, `--quick`.\n",
+        "MSE is ×1e-5, as displayed (clamped 8-bit sRGB in [0,1]), over the whole image on white, against the exact "
+        "picture that the CPU composites from all fragments in float64. *q* is (MSE + 1e-7) / (MSE of the oracle + "
+        '1e-7); the oracle is DHOIT\'s "optimal k-buffer", Algorithm 1, offline, with the weighted-average tail; the '
+        "*certified optimum* is the least error that any allocation of the budget has with the technique's own tail. "
+        "At *equal memory* each technique gets the total bytes that the fixed k-buffer takes with F = k WH, and F is "
+        "what its own buffers leave of it (DHOIT, Eq. 1). Times are medians of repeats in which all techniques take "
+        "turns, on a host clock that waits for each pass; readbacks are a pass of their own. Means over views are "
+        "geometric for errors, arithmetic else.\n",
+    ]
+    for driver, result in found.items():
+        parts += _driver(driver, result, drawn)
+    return "\n".join(parts)
+
+
+def pictures(result: BenchResult) -> dict[str, str]:
+    """Figure 6 as SVG files: name -> text."""
+    groups = groups_of(_first(result))
+    made = {f"figure6-{factor:g}": error_bars(groups, factor, standalone=True) for factor in FACTORS}
+    return {name: svg for name, svg in made.items() if svg}
+
+
+def _driver(driver: str, result: BenchResult, drawn: Mapping[tuple[str, str], str]) -> list[str]:
+    views, first = result.views, _first(result)
+    groups = groups_of(first)
+    about = first[0]
+    alpha = "authored alpha" if about.alpha is None else f"alpha {about.alpha:g}"
+    where = f"{alpha}, {about.width}x{about.height}"
+    parts = [f"## {driver}\n", *(f"{line}.\n" for line in dict.fromkeys(map(said_machine, views)))]
+    parts.append(_what(result))
+    parts.append(f"### Figure 6: squared error within a budget ({where})\n")
+    for factor in FACTORS:
+        if (file := drawn.get((driver, f"figure6-{factor:g}"))) is not None:
+            parts.append(f"F = {factor:g} WH:\n\n![Squared error within F = {factor:g} WH, by scene]({file})\n")
+        parts.append(f"F = {factor:g} WH; the least of what a renderer can run is bold:\n")
+        parts.append(tables.errors(groups, factor))
+    parts.append("### Score q, all views\n")
+    parts.append(tables.scores(views))
+    parts.append(_tables_of_the_paper(groups))
+    parts.append(f"### Every technique ({where}, bounded ones at F = {FACTORS[0]:g} WH)\n")
+    parts.append(tables.everything(first, FACTORS[0]))
+    parts.append("### Where each wins\n")
+    parts.append(
+        "On how many of the scenes (each opacity and size apart) a technique is on the Pareto front, and how often it "
+        "has the least error of a budget among those that a renderer can run:\n"
+    )
+    parts.append(tables.winners(groups_of(views)))
+    return parts
+
+
+def _what(result: BenchResult) -> str:
+    views = result.views
+    hours = sum(view.seconds for view in views) / 3600.0
+    cells = [cell for view in views for cell in view.cells if cell.repeats]
+    usual = max((cell.repeats for cell in cells), default=0)
+    slow = {cell.technique for cell in cells if cell.repeats < usual}
+    lines = [f"{len(views)} views of {len({view.scene for view in views})} scenes, {hours:.1f} h of measuring."]
+    lines.append(f"Bundle: {result.bundle}." if result.bundle else "No bundle was given: kbuffer-deep is left out.")
+    if slow:
+        lines.append(
+            f"{usual} timed frames a cell, fewer where they would take too long (a single one if that alone does): "
+            f"{', '.join(sorted(slow))}."
+        )
+    lines += result.left_out
+    return " ".join(lines) + "\n"
+
+
+def _tables_of_the_paper(groups: Sequence[Group]) -> str:
+    named = {tables.scene_of(each): each for each in groups}
+    rows = [(named[scene], factor) for scene, factor in PAPER if scene in named]
+    # Where the shared scenes are missing, any other shows the same.
+    rows = rows or [(groups[0], FACTORS[0])]
+    parts = []
+    for number, write, about in (
+        (1, tables.stages, "milliseconds of the stages"),
+        (2, tables.captured, "k(p) and captured fragments"),
+    ):
+        parts.append(f"### Table {number}: {about}\n")
+        for each, factor in rows:
+            most = max(view.most for view in each.views)
+            parts.append(f"{tables.scene_of(each)}, F = {factor:g} WH, D = {most}:\n")
+            parts.append(write(each, factor))
+    return "\n".join(parts)
+
+
+def _first(result: BenchResult) -> list[BenchView]:
+    """Views with the opacity and size that the suite begins with."""
+    one = result.views[0]
+    return [v for v in result.views if (v.alpha, v.width, v.height) == (one.alpha, one.width, one.height)]

@@ -1,0 +1,186 @@
+"""Markdown tables of the suite, each as one function of a result's groups."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+from schemas.bench import Basis, BenchView
+from services.bench.groups import (
+    ORACLE_WORDS,
+    Group,
+    Row,
+    group,
+    measured,
+    offline,
+    said_technique,
+    title_of,
+)
+from services.report.charts import pareto_front
+from services.summary import geometric_mean, number
+
+FEATURES, IMPORTANCE, BUFFER, READBACK = "feature extraction", "importance", "k-buffer", "readback"
+STAGES = (FEATURES, IMPORTANCE, BUFFER, READBACK)
+"""DHOIT's stages (Table 1), and what it does not time."""
+_BUFFER = {"opaque", "count", "prefix", "chain", "chain-depth", "chain-colour", "resolve"}
+NOT_MEASURED = "–"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def stage_of(name: str) -> str:
+    """DHOIT's stage that a pass belongs to: all between the sums and the buffer is what chooses k."""
+    if name == READBACK:
+        return READBACK
+    if name in _BUFFER:
+        return BUFFER
+    return FEATURES if name.startswith("gather") else IMPORTANCE
+
+
+def errors(groups: Sequence[Group], factor: float) -> str:
+    """Figure 6 in numbers: MSE x1e-5 of the bounded techniques and the offline allocations, a line a scene."""
+    names = _names(groups, "fragments")
+    marks = list(dict.fromkeys(mark.rule for each in groups for mark in offline(each)))
+    lines = []
+    for each in groups:
+        found = {said_technique(row.key): row.mse for row in _at(each, factor)}
+        best = {mark.rule: mark.mse for mark in offline(each) if mark.budget_factor == factor}
+        least = min((mse for name, mse in found.items() if mse and "optimal" not in name), default=None)
+        cells = [_bold(found.get(name), None if "optimal" in name else least) for name in names]
+        lines.append([scene_of(each), *cells, *(_e5(best.get(mark)) for mark in marks)])
+    return table(("scene", *names, *marks), lines)
+
+
+def stages(each: Group, factor: float) -> str:
+    """Table 1: milliseconds of DHOIT's stages on a scene; by the GPU's timer in brackets where it is right."""
+    lines = []
+    for row in _at(each, factor):
+        host = {stage: sum(ms for name, ms in row.passes.items() if stage_of(name) == stage) for stage in STAGES}
+        gpu = {stage: sum(ms for name, ms in row.gpu.items() if stage_of(name) == stage) for stage in STAGES}
+        cells = [f"{host[s]:.2f}" + (f" ({gpu[s]:.2f})" if row.gpu and s != READBACK else "") for s in STAGES]
+        lines.append([said_technique(row.key), *cells, number(row.ms)])
+    return table(("ms", *STAGES, "frame"), lines)
+
+
+def captured(each: Group, factor: float) -> str:
+    """Table 2: k(p) and captured fragments on a scene."""
+    lines = []
+    for row in _at(each, factor):
+        if row.k is not None and row.captured is not None:
+            share = f"{row.captured / 1e6:.2f} M ({100 * (row.of_all or 0):.0f} %)"
+            lines.append([said_technique(row.key), f"{row.k[0]}–{row.k[1]}", share])
+    for mark in offline(each):
+        if mark.budget_factor == factor and mark.rule.startswith(ORACLE_WORDS):
+            lines.append([mark.rule, f"{mark.k[0]}–{mark.k[1]}", f"{mark.captured / 1e6:.2f} M"])
+    return table(("technique", "k(p)", "fragments"), lines)
+
+
+def scores(views: Sequence[BenchView]) -> str:
+    """Q over all views, at equal fragments and at equal memory: geometric mean, and the worst view."""
+    whole = group("", views)
+    factors = sorted({row.key.budget_factor for row in whole.rows if row.key.budget_factor})
+    head = ["technique"]
+    head += [f"F = {f:g} WH" for f in factors] + ["worst"] + [f"M of k = {f:g}" for f in factors]
+    lines = []
+    for name in _names([whole], "fragments"):
+        of = [row for row in whole.rows if said_technique(row.key) == name]
+        by = {(row.key.basis, row.key.budget_factor): row.score for row in of}
+        # The fixed k-buffer's memory is what the others are given.
+        memory: Basis = "memory" if any(row.key.basis == "memory" for row in of) else "fragments"
+        worst = _worst(views, [row for row in of if row.key.basis == "fragments"])
+        equal = [number(by.get(("fragments", f))) for f in factors]
+        lines.append([name, *equal, worst, *(number(by.get((memory, f))) for f in factors)])
+    return table(head, lines)
+
+
+def everything(views: Sequence[BenchView], factor: float) -> str:
+    """All techniques over all views: time, memory, errors, flicker; bounded ones at one budget."""
+    whole = group("", views)
+    rows = [*measured(whole.rows, "none"), *_at(whole, factor)]
+    head = (
+        "technique",
+        "frame, ms",
+        "bytes / pixel",
+        "total, MiB",
+        "MSE ×1e-5",
+        "PSNR",
+        "SSIM",
+        "FLIP",
+        "flicker ×1e-3",
+    )
+    return table(
+        head,
+        [
+            [
+                said_technique(row.key),
+                number(row.ms),
+                NOT_MEASURED if row.pixel_bytes is None else str(row.pixel_bytes),
+                NOT_MEASURED if row.total_bytes is None else f"{row.total_bytes / 2**20:.1f}",
+                "exact" if row.family == "exact" else _e5(row.mse),
+                NOT_MEASURED if row.psnr is None else f"{row.psnr:.1f}",
+                NOT_MEASURED if row.ssim is None else f"{row.ssim:.4f}",
+                NOT_MEASURED if row.flip is None else f"{row.flip:.4f}",
+                number(None if row.flicker is None else 1e3 * row.flicker),
+            ]
+            for row in rows
+        ],
+    )
+
+
+def winners(groups: Sequence[Group]) -> str:
+    """How often each technique is on the Pareto front of a scene: time against error, bytes against error."""
+    in_time, in_bytes, least = Counter[str](), Counter[str](), Counter[str]()
+    fronts = 0
+    for each in groups:
+        rows = [*measured(each.rows, "none"), *measured(each.rows, "fragments")]
+        rows = [row for row in rows if row.is_runnable and (row.family == "exact" or row.mse is not None)]
+        fronts += 1
+        for counter, cost in ((in_time, "ms"), (in_bytes, "total_bytes")):
+            points = {(getattr(r, cost), r.mse or 0.0): said_technique(r.key) for r in rows if getattr(r, cost)}
+            counter.update({points[point] for point in pareto_front(list(points))})
+        for factor in {row.key.budget_factor for row in rows if row.key.basis == "fragments"}:
+            bounded = [row for row in rows if row.key.basis == "fragments" and row.key.budget_factor == factor]
+            if bounded:
+                least[said_technique(min(bounded, key=lambda row: row.mse or 0.0).key)] += 1
+    names = sorted({*in_time, *in_bytes, *least}, key=lambda name: (-in_time[name] - in_bytes[name], name))
+    head = ("technique", f"time and error, of {fronts}", f"bytes and error, of {fronts}", "least error of a budget")
+    return table(head, [[name, str(in_time[name]), str(in_bytes[name]), str(least[name])] for name in names])
+
+
+def scene_of(each: Group) -> str:
+    """The scene's name alone."""
+    return each.views[0].scene
+
+
+def _at(each: Group, factor: float) -> list[Row]:
+    return [row for row in measured(each.rows, "fragments") if row.key.budget_factor == factor]
+
+
+def _names(groups: Sequence[Group], basis: str) -> list[str]:
+    return list(dict.fromkeys(said_technique(row.key) for each in groups for row in measured(each.rows, basis)))
+
+
+def _worst(views: Sequence[BenchView], rows: Sequence[Row]) -> str:
+    keys = [row.key for row in rows]
+    found: dict[str, list[float]] = {}
+    for view in views:
+        for cell in view.cells:
+            if cell.score is not None and cell.key in keys:
+                found.setdefault(title_of(view), []).append(cell.score)
+    means = {title: geometric_mean(values) or 0.0 for title, values in found.items()}
+    if not means:
+        return NOT_MEASURED
+    title = max(means, key=lambda name: means[name])
+    return f"{number(means[title])} ({title})"
+
+
+def _e5(mse: float | None) -> str:
+    return number(None if mse is None else 1e5 * mse)
+
+
+def _bold(mse: float | None, least: float | None) -> str:
+    return f"**{_e5(mse)}**" if mse is not None and mse == least else _e5(mse)

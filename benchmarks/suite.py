@@ -1,0 +1,150 @@
+"""The committed benchmark: every technique on the papers' kind of scenes and the project's own, and a page of it.
+
+python -m benchmarks.suite --bundle FOLDER
+
+It can be stopped at any time and goes on where it was: what was measured lies in `--work`. `--quick` measures two
+scenes at 320x214 and writes nothing beside `--work`. Without `--bundle`, `kbuffer-deep` is left out. No technique is
+timed for longer than `--limit` seconds a cell beside its warm-up: one that takes longer for a single frame, such as
+depth peeling on a software driver, is timed once, by that frame.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from benchmarks.comparing.page import page, pictures
+from benchmarks.comparing.scenes import ALPHAS, SIZES, Part, cases_of, parts_of
+from renderer.context import describe, gl_context
+from schemas.bench import BenchResult
+from services.bench.files import write_files
+from services.bench.kept import Kept
+from services.bench.options import BenchOptions, parse_alphas, parse_sizes
+from services.bench.run import bench, result_of
+from services.progress import Progress, make_progress
+from services.render_options import EVERY, parse_techniques
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "benchmarks" / "results"
+PAGE = ROOT / "benchmarks" / "BENCH.md"
+COMMAND = "make bench"
+TECHNIQUES = [EVERY]
+_QUICK = {"sizes": ((320, 214),), "alphas": (0.33,), "scenes": ("sponza", "bottles")}
+
+
+def main() -> int:
+    """Measures what is missing, then writes results, figures and the page."""
+    arguments = _parse()
+    progress = make_progress(sys.stderr)
+    work = arguments.work / ("quick" if arguments.quick else label())
+    left_out: list[str] = []
+    bundle: str | None = None
+    with tempfile.TemporaryDirectory(prefix="diaphane-suite-") as folder:
+        cases = cases_of(arguments.scenes, Path(folder), arguments.only.split(",") if arguments.only else ())
+        parts = list(parts_of(cases, arguments.alphas, arguments.sizes))
+        for number, part in enumerate(parts if not arguments.page_only else ()):
+            start = time.perf_counter()
+            found = bench(_options(part, arguments, work), COMMAND, progress)
+            left_out, bundle = [*left_out, *found.left_out], found.bundle
+            _tell(progress, part, number, len(parts), time.perf_counter() - start)
+    kept = Kept(work, resume=True)
+    if arguments.page_only:
+        bundle = next((c.bundle for view in reversed(kept.views) for c in view.cells if c.bundle), None)
+    result = result_of(kept, COMMAND, bundle, [plain_path(line) for line in left_out])
+    if not result.views:
+        print("Nothing was measured.", file=sys.stderr)
+        return 1
+    write_files(work, result)
+    if arguments.quick:
+        print(page({"quick": result}, {}))
+        return 0
+    _publish(result)
+    print(PAGE)
+    return 0
+
+
+def label() -> str:
+    """Short name of the driver, for files: what the renderer is called before any bracket, slash or comma."""
+    name = re.split(r"[(/,]", describe(gl_context()).lower())[0]
+    return "-".join(re.findall(r"[a-z0-9]+", name))
+
+
+def _publish(result: BenchResult) -> None:
+    """The committed files of this driver, and the page of those of all drivers."""
+    name = label()
+    lines = "".join(view.model_dump_json(exclude_defaults=True) + "\n" for view in result.views)
+    head = result.model_copy(update={"views": ()}).model_dump_json(exclude_defaults=True)
+    RESULTS.mkdir(exist_ok=True)
+    (RESULTS / f"bench-{name}.jsonl").write_text(f"{head}\n{lines}", encoding="utf-8")
+    found = {path.stem.removeprefix("bench-"): read_lines(path) for path in sorted(RESULTS.glob("bench-*.jsonl"))}
+    drawn = {}
+    for of, each in found.items():
+        for figure, svg in pictures(each).items():
+            file = RESULTS / f"bench-{of}-{figure}.svg"
+            file.write_text(svg + "\n", encoding="utf-8")
+            drawn[of, figure] = file.relative_to(PAGE.parent).as_posix()
+    PAGE.write_text(page(found, drawn), encoding="utf-8")
+
+
+def read_lines(path: Path) -> BenchResult:
+    """A committed result: a line for all but the views, then a line for each view."""
+    head, *views = map(json.loads, path.read_text(encoding="utf-8").splitlines())
+    return BenchResult.model_validate({**head, "views": views})
+
+
+def plain_path(line: str) -> str:
+    """A sentence without the folder that its scene lies in."""
+    return re.sub(r"\S*/", "", line)
+
+
+def _options(part: Part, arguments: argparse.Namespace, work: Path) -> BenchOptions:
+    bundle = None if arguments.bundle is None else str(arguments.bundle)
+    return BenchOptions(
+        scenes=(part.case.path,),
+        techniques=parse_techniques(TECHNIQUES, bundle is not None),
+        out=work,
+        alphas=(part.alpha,),
+        sizes=(part.size,),
+        bundle=bundle,
+        views=part.case.views,
+        most_views=arguments.views,
+        variants=part.case.variants,
+        path=part.path,
+        repeats=arguments.repeats,
+        limit=arguments.limit,
+    )
+
+
+def _tell(progress: Progress, part: Part, number: int, total: int, seconds: float) -> None:
+    alpha = "authored alpha" if part.alpha is None else f"alpha {part.alpha:g}"
+    progress.note(f"part {number + 1} of {total}: {part.case.scene}, {alpha}, {part.size}: {seconds:.0f} s")
+
+
+def _parse() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", type=Path, default=ROOT.parent / "shared" / "scenes", help="with MANIFEST.json")
+    parser.add_argument("--only", help="names of scenes, with commas: a part of the suite")
+    parser.add_argument("--alpha", dest="alphas", type=parse_alphas, default=ALPHAS, help="as of diaphane bench")
+    parser.add_argument("--size", dest="sizes", type=parse_sizes, default=SIZES, help="as of diaphane bench")
+    parser.add_argument("--views", type=int, default=1, help="of each scene")
+    parser.add_argument("--bundle", help="folder of a bundle")
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--limit", type=float, default=10.0, help="seconds for the repeats of one cell")
+    parser.add_argument("--work", type=Path, default=ROOT / ".diaphane" / "bench", help="results under way")
+    parser.add_argument("--quick", action="store_true", help="two scenes at 320x214, nothing is published")
+    parser.add_argument("--page-only", action="store_true", help="measure nothing")
+    arguments = parser.parse_args()
+    if arguments.quick:
+        arguments.sizes, arguments.alphas = _QUICK["sizes"], _QUICK["alphas"]
+        arguments.only = arguments.only or ",".join(map(str, _QUICK["scenes"]))
+        arguments.repeats = 1
+    return arguments
+
+
+if __name__ == "__main__":
+    sys.exit(main())

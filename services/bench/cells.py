@@ -1,0 +1,88 @@
+"""Which cells a view has, in the order in which they are shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from renderer.techniques import TECHNIQUES
+from renderer.techniques.chain import SLOT_BYTES
+from schemas.bench import Basis, CellKey
+from schemas.bundle import MANIFEST, TailSpec, load_manifest
+from schemas.tail import TailName
+from services.bench.options import BenchOptions
+from services.store import file_sha256
+
+FIXED = "kbuffer"
+"""Whose total bytes are what the others are given at equal memory."""
+LEARNED = "kbuffer-deep"
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """The bundle under test.
+
+    Attributes:
+        folder: Where it lies.
+        label: Name and digest of its manifest, which lists the digests of its files.
+        tail: Tail that it was trained for, and is rendered with.
+    """
+
+    folder: Path
+    label: str
+    tail: TailSpec
+
+
+def bundle_of(folder: Path) -> Bundle:
+    """A bundle, verified.
+
+    Raises:
+        Problem: It is none, or damaged.
+    """
+    manifest = load_manifest(folder)
+    return Bundle(folder, f"{manifest.name}@{file_sha256(folder / MANIFEST)[:12]}", manifest.tail)
+
+
+def planned(options: BenchOptions, bundle: Bundle | None) -> list[CellKey]:
+    """All cells of a view."""
+    cells = []
+    for name in options.techniques:
+        if TECHNIQUES[name].family != "bounded":
+            cells.append(CellKey(technique=name, basis="none"))
+            continue
+        for tail, g, label in _tails(name, options, bundle):
+            bases: Sequence[Basis] = ("fragments", "memory") if options.equal_memory else ("fragments",)
+            cells += [
+                CellKey(technique=name, basis=basis, budget_factor=factor, tail=tail, g=g, bundle=label)
+                for factor in options.budgets
+                for basis in bases
+                # At equal memory the fixed k-buffer gets what it has.
+                if (name, basis) != (FIXED, "memory")
+            ]
+    return cells
+
+
+def _tails(name: str, options: BenchOptions, bundle: Bundle | None) -> list[tuple[TailName, float | None, str | None]]:
+    if name == LEARNED and bundle is not None:
+        return [(bundle.tail.name, steepness(bundle.tail.name, bundle.tail.g), bundle.label)]
+    return [(tail, steepness(tail, options.g), None) for tail in options.tails]
+
+
+def steepness(tail: TailName, g: float) -> float | None:
+    """The g of a tail that has one; None for the others."""
+    return g if tail.startswith("density") else None
+
+
+def fragments_within(total_bytes: int, pixels: int, pixel_bytes: int) -> int:
+    """F that a total memory buys: `F(M) = floor((M - |P| S_p) / S_f)` (DHOIT, Eq. 1; all of S_i is in S_p).
+
+    Args:
+        total_bytes: M.
+        pixels: |P|.
+        pixel_bytes: S_p, bytes a pixel of everything but the pool.
+
+    Returns:
+        Fragments; negative where the buffers of the pixels alone take more.
+    """
+    return (total_bytes - pixels * pixel_bytes) // SLOT_BYTES

@@ -1,0 +1,156 @@
+"""The cells of one view, measured: pictures first, for errors and bytes, then times in turns, then the camera path."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from renderer.techniques import TECHNIQUES, Budget, Needs, Rendered, Technique, technique
+from schemas.bench import LOSSLESS, BenchCell, CellKey, Yardstick
+from schemas.problem import ExitCode, Problem
+from schemas.tail import DENSITY_G, TailName
+from services.bench.cells import FIXED, Bundle, fragments_within
+from services.bench.flicker import measure_flicker
+from services.bench.options import BenchOptions
+from services.bench.rounds import Run, in_turns
+from services.bench.subject import ORACLE_TAIL, Subject
+
+_UNREAD = 2.0
+"""Budget as a multiple of the pixels, for techniques that read none."""
+
+
+@dataclass(slots=True)
+class _Bytes:
+    """Bytes a pixel, and of everything."""
+
+    pixel: int
+    total: int
+
+
+@dataclass(slots=True)
+class Bench:
+    """A view being measured.
+
+    Args:
+        subject: The view.
+        options: What was asked for.
+        bundle: For `kbuffer-deep`.
+    """
+
+    subject: Subject
+    options: BenchOptions
+    bundle: Bundle | None
+    _cells: dict[CellKey, BenchCell] = field(default_factory=dict)
+    _runs: list[Run] = field(default_factory=list)
+    _bytes: dict[CellKey, _Bytes] = field(default_factory=dict)
+    _marks: dict[tuple[str, TailName, float | None, float], Yardstick] = field(default_factory=dict)
+
+    def measure(self, keys: Sequence[CellKey]) -> tuple[list[Yardstick], list[BenchCell]]:
+        """Yardsticks and cells, in the order of the keys."""
+        self._measure_yardsticks(keys)
+        for key in sorted(keys, key=lambda key: key.basis == "memory"):
+            self._cells[key] = self._pictured(key)
+        timed = [run for run in self._runs if run.key.basis != "memory"]
+        in_turns(self.subject, timed, self.options.repeats, self.options.limit)
+        for run in timed:
+            times = {"repeats": len(run.recordings), "passes": run.passes(), "gpu": run.gpu(), "frame": run.frame()}
+            self._cells[run.key] = self._cells[run.key].model_copy(update=times)
+        if self.options.path:
+            for key, found in measure_flicker(self.subject, timed, self.options.path).items():
+                update = {"flicker": found.colour, "flicker_k": found.k}
+                self._cells[key] = self._cells[key].model_copy(update=update)
+        return list(self._marks.values()), [self._cells[key] for key in keys]
+
+    def _measure_yardsticks(self, keys: Sequence[CellKey]) -> None:
+        tails = dict.fromkeys((key.tail, key.g) for key in keys if key.tail is not None)
+        found = self.subject.yardsticks("greedy", ORACLE_TAIL, DENSITY_G, self.options.budgets)
+        for tail, g in tails:
+            found += self.subject.yardsticks("optimal", tail, DENSITY_G if g is None else g, self.options.budgets)
+        self._marks = {(mark.rule, mark.tail, mark.g, mark.budget_factor): mark for mark in found}
+
+    def _pictured(self, key: CellKey) -> BenchCell:
+        """A cell with everything but times and flicker."""
+        about = {**key.model_dump(), "family": TECHNIQUES[key.technique].family}
+        fragments = self._fragments(key)
+        if key.basis != "none":
+            about |= {"budget": max(fragments, 0), "exact": fragments >= self.subject.dump.total}
+        if fragments < 1:
+            return BenchCell(**about, problem="the buffers of the pixels alone take more than this memory")
+        run = self._run(key, fragments)
+        try:
+            rendered = run.first(self.subject, self.options.limit)
+        except Problem as problem:
+            if problem.code != ExitCode.LIMIT:
+                raise
+            return BenchCell(**about, problem=problem.title)
+        wrong = np.count_nonzero(~np.isfinite(rendered.linear).all(axis=2))
+        if wrong:
+            return BenchCell(**about, problem=f"{wrong:,} pixels of the picture are no numbers")
+        self._runs.append(run)
+        self._bytes[key] = _Bytes(rendered.pixel_bytes, rendered.total_bytes)
+        return BenchCell(**about, **self._facts(rendered), **self._judged(key, rendered, bool(about.get("exact"))))
+
+    def _fragments(self, key: CellKey) -> int:
+        """F of a cell; less than 1 where there is no room for any."""
+        factor = _UNREAD if key.budget_factor is None else key.budget_factor
+        given = self.subject.budgets([factor])[0]
+        if key.basis != "memory":
+            return given
+        fixed = self._bytes_of(key.model_copy(update={"technique": FIXED, "basis": "fragments", "bundle": None}))
+        own = self._bytes_of(key.model_copy(update={"basis": "fragments"}))
+        return fragments_within(fixed.total, self.subject.pixels, own.pixel)
+
+    def _bytes_of(self, key: CellKey) -> _Bytes:
+        """Bytes of a cell at equal F, from its picture, or from one that is made for this."""
+        if key not in self._bytes:
+            rendered = self._run(key, self._fragments(key)).first(self.subject, self.options.limit)
+            self._bytes[key] = _Bytes(rendered.pixel_bytes, rendered.total_bytes)
+        return self._bytes[key]
+
+    def _run(self, key: CellKey, fragments: int) -> Run:
+        budget = Budget(fragments)
+        if key.tail is not None:
+            budget = Budget(fragments, key.tail, DENSITY_G if key.g is None else key.g)
+        return Run(key, self._technique(key), budget)
+
+    def _technique(self, key: CellKey) -> Technique:
+        folder = None if self.bundle is None else self.bundle.folder
+        needs: Needs = replace(self.options.needs, bundle=folder, allocate=self.subject.allocate)
+        return technique(key.technique, needs)
+
+    def _facts(self, rendered: Rendered) -> dict[str, Any]:
+        k = rendered.k[self.subject.dump.counts > 0]
+        return {
+            "k_min": int(k.min()) if len(k) else 0,
+            "k_max": int(k.max(initial=0)),
+            "captured_fragments": rendered.captured,
+            "pool_bytes": rendered.pool_bytes,
+            "pixel_bytes": rendered.pixel_bytes,
+            "total_bytes": rendered.total_bytes,
+            "skips": {what: int(count) for what, count in rendered.skips.items() if count},
+        }
+
+    def _judged(self, key: CellKey, rendered: Rendered, is_exact: bool) -> dict[str, Any]:
+        """Errors, and what they are over those of the yardsticks where something had to be decided."""
+        errors = self.subject.errors(rendered)
+        judged: dict[str, Any] = asdict(errors)
+        if key.budget_factor is None or key.tail is None or is_exact:
+            return judged
+        oracle = self._marks["greedy", ORACLE_TAIL, None, key.budget_factor]
+        optimum = self._marks["optimal", key.tail, key.g, key.budget_factor]
+        if oracle.budget >= self.subject.dump.total:
+            return judged
+        return {
+            **judged,
+            "score": over(errors.mse, oracle.mse),
+            "score_display": over(errors.mse_display, oracle.mse_display),
+            "over_optimum": over(errors.mse, optimum.mse),
+        }
+
+
+def over(error: float, reference: float) -> float:
+    """`(error + LOSSLESS) / (reference + LOSSLESS)`."""
+    return (error + LOSSLESS) / (reference + LOSSLESS)

@@ -1,0 +1,182 @@
+"""What a user can ask `diaphane bench` for, checked before any work starts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from renderer.techniques import Needs
+from schemas.limits import LIMITS
+from schemas.problem import ExitCode, Problem
+from schemas.tail import DEFAULT_TAIL, DENSITY_G, TailName
+from services.options import parse_size, parse_tail
+
+AUTHORED = "authored"
+"""The word for the materials' own opacity."""
+DEFAULT_SIZE = (1430, 960)
+"""DHOIT's."""
+DEFAULT_BUDGETS = (1.0, 2.0, 4.0)
+MOST_FRAMES = 1000
+MOST_REPEATS = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class BenchOptions:
+    """What to measure.
+
+    Attributes:
+        scenes: Files.
+        techniques: Names, see `services.render_options.parse_techniques`.
+        out: Folder of the results.
+        budgets: F as multiples of width * height.
+        alphas: Opacities that every surface gets, one run each; None: the materials' own.
+        sizes: Widths and heights, one run each.
+        tails: Of the bounded techniques; `kbuffer-deep` always has its bundle's.
+        g: Steepness of the density tail.
+        bundle: Folder of a bundle, or a name in the registry, for `kbuffer-deep`.
+        needs: What else some techniques need.
+        camera: Name or path of a camera.
+        views: A views file.
+        most_views: Most views of a scene, spread over those that the file lists; None: all.
+        variants: Selections, see `renderer.scene.LoadOptions`.
+        refine: Levels of subdivision.
+        equal_memory: Whether bounded techniques are also measured at equal total bytes.
+        path: Frames of the camera path that flicker is measured on; 0: none.
+        repeats: Timed frames of each cell, after a warm-up.
+        limit: Seconds that the repeats of one cell may take; what takes longer by itself is timed once.
+        resume: Whether cells that were measured into `out` already are kept.
+        state: Folder of the registry.
+
+    Raises:
+        Problem: Something of it cannot be.
+    """
+
+    scenes: tuple[Path, ...]
+    techniques: tuple[str, ...]
+    out: Path
+    budgets: tuple[float, ...] = DEFAULT_BUDGETS
+    alphas: tuple[float | None, ...] = (None,)
+    sizes: tuple[tuple[int, int], ...] = (DEFAULT_SIZE,)
+    tails: tuple[TailName, ...] = (DEFAULT_TAIL,)
+    g: float = DENSITY_G
+    bundle: str | None = None
+    needs: Needs = field(default_factory=Needs)
+    camera: str | None = None
+    views: Path | None = None
+    most_views: int | None = None
+    variants: tuple[str, ...] = ()
+    refine: int = 0
+    equal_memory: bool = True
+    path: int = 0
+    repeats: int = 3
+    limit: float = 10.0
+    resume: bool = True
+    state: Path = Path(".diaphane")
+
+    def __post_init__(self) -> None:
+        for scene in self.scenes:
+            if not scene.is_file():
+                raise Problem(f"There is no scene {scene}.", "Check the path.", ExitCode.NOT_FOUND)
+        names = [scene.stem for scene in self.scenes]
+        for name in names:
+            if names.count(name) > 1:
+                raise Problem(f"{names.count(name)} scenes are called {name}.", "Give each file a name of its own.")
+        if not 1 <= len(self.budgets) <= LIMITS.budgets:
+            raise Problem(f"{len(self.budgets)} budgets are not possible.", f"Give 1 to {LIMITS.budgets}.")
+        for budget in self.budgets:
+            if not (math.isfinite(budget) and 0.0 < budget <= LIMITS.budget):
+                raise Problem(
+                    f"A budget of {budget:g} cannot be used.",
+                    f"Give multiples of width x height, above 0 and at most {LIMITS.budget:g}: --budgets 1,2,4.",
+                )
+        for side in (side for size in self.sizes for side in size):
+            if not LIMITS.min_side <= side <= LIMITS.max_side:
+                raise Problem(
+                    f"{side} pixels are no side of a picture here.",
+                    f"Give {LIMITS.min_side} to {LIMITS.max_side} pixels.",
+                )
+        if not (math.isfinite(self.g) and 0.0 <= self.g <= 10.0):
+            raise Problem(f"--g {self.g} is not between 0 and 10.", "Change that option.")
+        _in_range("--repeats", self.repeats, 1, MOST_REPEATS)
+        _in_range("--most-views", self.most_views, 1, LIMITS.views)
+        if self.path:
+            _in_range("--path", self.path, 2, MOST_FRAMES)
+        if not (math.isfinite(self.limit) and self.limit > 0.0):
+            raise Problem(f"--limit {self.limit} is no time.", "Give seconds, above 0.")
+        if "kbuffer-deep" in self.techniques and self.bundle is None:
+            raise Problem("kbuffer-deep needs a bundle.", "Name one with --bundle, or leave the technique out.")
+
+
+def parse_budgets(text: str) -> tuple[float, ...]:
+    """Multiples of width * height, ascending, without duplicates.
+
+    Args:
+        text: Numbers with commas between.
+
+    Raises:
+        Problem: It has something else.
+    """
+    return tuple(sorted({_number(part, "--budgets", "1,2,4") for part in _parts(text, "--budgets", "1,2,4")}))
+
+
+def parse_alphas(text: str | None) -> tuple[float | None, ...]:
+    """Opacities of all surfaces; None stands for the materials' own.
+
+    Args:
+        text: Numbers and the word `authored`, with commas between; None: authored.
+
+    Raises:
+        Problem: It has something else, or a number outside (0, 1].
+    """
+    found: list[float | None] = []
+    for part in _parts(text if text is not None else AUTHORED, "--alpha", ".15,.33,authored"):
+        alpha = None if part == AUTHORED else _number(part, "--alpha", ".15,.33,authored")
+        if alpha is not None and not 0.0 < alpha <= 1.0:
+            raise Problem(f"An alpha of {alpha:g} is not possible.", "Give a number above 0 and at most 1.")
+        found.append(alpha)
+    return tuple(dict.fromkeys(found))
+
+
+def parse_sizes(text: str) -> tuple[tuple[int, int], ...]:
+    """Sizes of pictures.
+
+    Args:
+        text: WIDTHxHEIGHT, several with commas between.
+
+    Raises:
+        Problem: It has something else.
+    """
+    return tuple(dict.fromkeys(parse_size(part) for part in _parts(text, "--size", "1430x960,1920x1080")))
+
+
+def parse_tails(text: str) -> tuple[TailName, ...]:
+    """Tails.
+
+    Args:
+        text: Names with commas between.
+
+    Raises:
+        Problem: There is no such tail.
+    """
+    return tuple(dict.fromkeys(parse_tail(part) for part in _parts(text, "--tails", "density,exact-coverage")))
+
+
+def _parts(text: str, option: str, example: str) -> Sequence[str]:
+    parts = [part.strip() for part in text.split(",") if part.strip()]
+    if not parts:
+        raise Problem(f"{option} is empty.", f"Write it like {option} {example}.")
+    return parts
+
+
+def _number(part: str, option: str, example: str) -> float:
+    try:
+        return float(part)
+    except ValueError:
+        raise Problem(f"{option} has '{part}', which is no number.", f"Write it like {option} {example}.") from None
+
+
+def _in_range(option: str, value: int | None, low: int, high: int) -> None:
+    if value is not None and not low <= value <= high:
+        raise Problem(f"{option} {value} cannot be used.", f"Give a number from {low} to {high}.")

@@ -1,0 +1,218 @@
+"""A whole benchmark: scenes, opacities, sizes and views one after the other, results appended view by view."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from renderer.context import describe, gl_context
+from renderer.scene import LoadOptions
+from renderer.timing import timers_are_right
+from renderer.usd.digest import scene_digest
+from schemas.bench import BenchResult, BenchView
+from schemas.problem import ExitCode, Problem
+from schemas.scene import SceneArrays
+from schemas.view import View
+from services.bench.cells import Bundle, bundle_of, planned
+from services.bench.kept import Kept
+from services.bench.measure import Bench
+from services.bench.options import BenchOptions
+from services.bench.subject import Subject
+from services.local_scenes import LocalScene, as_usd
+from services.progress import Progress
+from services.rendering import bundle_folder
+from services.store import canonical_json
+from services.versions import code_version, commit, library_versions, machine
+
+MEASURED_BY = ("labeller", "renderer", "schemas", "services.bench")
+"""Sources that decide a result."""
+
+Told = Callable[[BenchView], None]
+"""Is told of each view that was measured."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a view is seen: all that its key is made of."""
+
+    file: Path
+    digest: str
+    alpha: float | None
+    size: tuple[int, int]
+    view: View
+
+
+def bench(options: BenchOptions, command: str, progress: Progress, told: Told = lambda _: None) -> BenchResult:
+    """Measure what is not measured yet, and give all results of the folder.
+
+    Args:
+        options: What to measure.
+        command: How it was asked for.
+        progress: Gets notes.
+        told: Is called with each view when it is on the disk.
+
+    Raises:
+        Problem: A scene cannot be read, or the bundle is none.
+    """
+    kept = Kept(options.out, options.resume)
+    left_out: list[str] = []
+    with _bundle(options) as bundle:
+        for file in options.scenes:
+            with as_usd(file) as usd:
+                for place, subject in _places(options, file, usd, left_out, progress):
+                    _measure(place, subject, options, bundle, kept, progress, told)
+    return result_of(kept, command, None if bundle is None else bundle.label, left_out)
+
+
+def result_of(kept: Kept, command: str, bundle: str | None, left_out: Sequence[str] = ()) -> BenchResult:
+    """All results of a folder, but for those of other bundles.
+
+    Args:
+        kept: The folder.
+        command: How it was asked for.
+        bundle: Label of the bundle, or None.
+        left_out: What could not be measured.
+    """
+    views = []
+    for view in kept.merged():
+        cells = tuple(cell for cell in view.cells if cell.bundle in (None, bundle))
+        views.append(view.model_copy(update={"cells": cells}))
+    return BenchResult(
+        command=command,
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        versions=library_versions(),
+        bundle=bundle,
+        left_out=tuple(left_out),
+        views=tuple(views),
+    )
+
+
+def _places(
+    options: BenchOptions, file: Path, usd: Path, left_out: list[str], progress: Progress
+) -> Iterator[tuple[_Place, Subject]]:
+    digest = scene_digest(usd)
+    for alpha in options.alphas:
+        local = LocalScene(file, usd, LoadOptions(alpha=alpha, variants=options.variants, refine=options.refine))
+        scene = local.at(None)
+        if scene.is_opaque:
+            left_out.append(f"{file}, {said_alpha(alpha)}: nothing in it is transparent.")
+            progress.note(left_out[-1])
+            continue
+        for view in _views(local, options):
+            for size in options.sizes:
+                yield _Place(file, digest, alpha, size, view), Subject(local.gpu(), view, size)
+
+
+def _views(local: LocalScene, options: BenchOptions) -> list[View]:
+    views = [chosen.view for chosen in local.views(options.camera, options.views)]
+    most = options.most_views or len(views)
+    return views[:: max(1, len(views) // most)][:most]
+
+
+def _measure(
+    place: _Place,
+    subject: Subject,
+    options: BenchOptions,
+    bundle: Bundle | None,
+    kept: Kept,
+    progress: Progress,
+    told: Told,
+) -> None:
+    key = _key(place, options)
+    missing = kept.missing(key, planned(options, bundle))
+    where = f"{place.file.stem}, {said_alpha(place.alpha)}, {place.size[0]}x{place.size[1]}, {place.view.name}"
+    if not missing:
+        progress.note(f"{where}: measured already")
+        return
+    load, start = os.getloadavg()[0], time.perf_counter()
+    n = subject.dump.counts
+    marks, cells = Bench(subject, options, bundle).measure(missing)
+    scene: SceneArrays = subject.gpu.scene
+    view = BenchView(
+        key=key,
+        scene=place.file.stem,
+        view=place.view.name,
+        alpha=place.alpha,
+        width=place.size[0],
+        height=place.size[1],
+        triangles=len(scene.indices) // 3,
+        fragments=subject.dump.total,
+        occupied=int((n > 0).sum()),
+        most=int(n.max(initial=0)),
+        path_frames=options.path,
+        yardsticks=tuple(marks),
+        cells=tuple(cells),
+        driver=describe(gl_context()),
+        clock=_clock(),
+        machine=machine(),
+        commit=commit(),
+        code=code_version(*MEASURED_BY),
+        created=datetime.now(UTC).isoformat(timespec="seconds"),
+        seconds=time.perf_counter() - start,
+        load=(load, os.getloadavg()[0]),
+    )
+    kept.add(view)
+    progress.note(f"{where}: {len(cells)} cells in {view.seconds:.0f} s")
+    told(view)
+
+
+def said_alpha(alpha: float | None) -> str:
+    """Opacity in words."""
+    return "authored alpha" if alpha is None else f"alpha {alpha:g}"
+
+
+def _key(place: _Place, options: BenchOptions) -> str:
+    """Digest of everything but the cells that decides the result.
+
+    The code does not count: a run that was stopped goes on after a change of a comment, and every line says by which
+    code it was measured.
+    """
+    parts = {
+        "scene": place.digest,
+        "alpha": place.alpha,
+        "size": place.size,
+        "view": place.view.model_dump(mode="json"),
+        "variants": options.variants,
+        "refine": options.refine,
+        "needs": {"vkb": asdict(options.needs.vkb), "inference": options.needs.inference},
+        "nodes": options.needs.nodes,
+        "samples": options.needs.samples,
+        "times": (options.repeats, options.limit),
+        "path": options.path,
+        "driver": describe(gl_context()),
+        "machine": machine(),
+    }
+    return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
+
+
+def _clock() -> str:
+    host = "host clock, each pass finished before and after"
+    if timers_are_right(gl_context()):
+        return f"{host}; GPU timer queries beside it"
+    return f"{host}; this driver's GPU timer queries are not right"
+
+
+@contextmanager
+def _bundle(options: BenchOptions) -> Iterator[Bundle | None]:
+    with bundle_folder(options.bundle, options.state) as folder:
+        yield None if folder is None else bundle_of(folder)
+
+
+def check_same_code(result: BenchResult) -> str | None:
+    """A sentence if lines were measured by different sources; None if all are of one."""
+    codes = {view.code for view in result.views}
+    if len(codes) < 2:
+        return None
+    return f"These results were measured by {len(codes)} versions of the sources; --fresh measures all by one."
+
+
+def no_views(result: BenchResult) -> Problem:
+    """What to say where nothing could be measured."""
+    why = " ".join(result.left_out)
+    return Problem(f"There is nothing to measure. {why}".strip(), "Give --alpha .33, or a scene.", ExitCode.NOT_FOUND)

@@ -1,0 +1,203 @@
+"""`diaphane bench`: every technique on views of scene files: time of each pass, bytes, errors."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAIL_HELP
+from services.cli import output
+from services.cli.lines import print_columns, size
+from services.cli.scene_options import CameraOption, ComplexityOption, RefineOption, VariantOption
+from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
+from services.summary import MSE_FLOOR, number
+
+if TYPE_CHECKING:
+    from services.bench.groups import Group, Row
+
+
+def bench(
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="SCENE...", help="Scenes: .usd, .usda, .usdc, .usdz, .glb, .gltf, .obj, .ply, .stl."),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", help="Folder of the results: JSON lines, JSON, Vega-Lite plots, an HTML page."),
+    ],
+    techniques: Annotated[str, typer.Option("--techniques", "-t", help="Names with commas between, or all.")] = "all",
+    budgets: Annotated[str, typer.Option("--budgets", help="Fragments, as multiples of width x height.")] = "1,2,4",
+    alpha: Annotated[
+        str | None,
+        typer.Option(
+            "--alpha", help="Opacities that every surface gets, and authored: .15,.33,authored. Default: authored."
+        ),
+    ] = None,
+    picture_size: Annotated[
+        str, typer.Option("--size", help="WIDTHxHEIGHT in pixels; several with commas between.")
+    ] = "1430x960",
+    tails: Annotated[
+        str,
+        typer.Option("--tails", help=f"Of bounded techniques, with commas between. {TAIL_HELP}"),
+    ] = DEFAULT_TAIL,
+    g: Annotated[float, typer.Option("--g", help="Steepness of the density tail.")] = DENSITY_G,
+    bundle: Annotated[
+        str | None, typer.Option("--bundle", help="For kbuffer-deep: a folder, or NAME@ALIAS of the registry.")
+    ] = None,
+    inference: Annotated[
+        str, typer.Option("--inference", help="How kbuffer-deep runs its network: glsl or onnx.")
+    ] = "glsl",
+    vkb: Annotated[
+        str,
+        typer.Option("--vkb", help="For kbuffer-importance: thesis, no-depth, no-periphery, no-fresnel, no-noise."),
+    ] = "",
+    nodes: Annotated[int | None, typer.Option("--nodes", help="Nodes a pixel of multilayer and adaptive.")] = None,
+    samples: Annotated[int | None, typer.Option("--samples", help="Samples a pixel of stochastic.")] = None,
+    camera: CameraOption = None,
+    views: Annotated[
+        Path | None, typer.Option("--views", help="JSON file with views; all that it has of a scene are measured.")
+    ] = None,
+    most_views: Annotated[
+        int | None, typer.Option("--most-views", help="Most views of a scene, spread over those of --views.")
+    ] = None,
+    complexity: ComplexityOption = None,
+    refine: RefineOption = None,
+    variant: VariantOption = None,
+    equal_memory: Annotated[
+        bool,
+        typer.Option(
+            "--equal-memory/--equal-fragments", help="Also at the total bytes that the fixed k-buffer takes, or not."
+        ),
+    ] = True,
+    path: Annotated[
+        int, typer.Option("--path", metavar="FRAMES", help="Frames of a camera path for flicker; 0: none.")
+    ] = 0,
+    repeats: Annotated[int, typer.Option("--repeats", help="Timed frames of each cell, after a warm-up.")] = 3,
+    limit: Annotated[
+        float, typer.Option("--limit", help="Seconds for the repeats of one cell; slower ones are timed once.")
+    ] = 10.0,
+    resume: Annotated[
+        bool, typer.Option("--resume/--fresh", help="Keep what was measured into --out already, or measure all anew.")
+    ] = True,
+    state: StateOption = DEFAULT_STATE,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure every technique: time of each pass, bytes, errors, scores at equal fragments and equal memory."""
+    from services.bench.groups import group, groups_of
+    from services.bench.options import BenchOptions, parse_alphas, parse_budgets, parse_sizes, parse_tails
+    from services.progress import make_progress
+    from services.render_options import parse_needs, parse_refine, parse_techniques
+
+    options = BenchOptions(
+        scenes=tuple(files),
+        techniques=parse_techniques([techniques], bundle is not None),
+        out=out,
+        budgets=parse_budgets(budgets),
+        alphas=parse_alphas(alpha),
+        sizes=parse_sizes(picture_size),
+        tails=parse_tails(tails),
+        g=g,
+        bundle=bundle,
+        needs=parse_needs(vkb, inference, nodes, samples),
+        camera=camera,
+        views=views,
+        most_views=most_views,
+        variants=tuple(variant or ()),
+        refine=parse_refine(complexity, refine),
+        equal_memory=equal_memory,
+        path=path,
+        repeats=repeats,
+        limit=limit,
+        resume=resume,
+        state=state,
+    )
+    from services.bench.files import write_files
+    from services.bench.run import bench as run
+    from services.bench.run import check_same_code, no_views
+
+    progress = make_progress(sys.stderr, silent=as_json)
+    result = run(options, shlex.join(["diaphane", *sys.argv[1:]]), progress)
+    if not result.views:
+        raise no_views(result)
+    write_files(out, result)
+    if as_json:
+        output.print_json(result.model_dump(mode="json", exclude_defaults=True))
+        return
+    groups = groups_of(result.views)
+    for each in [*groups, *([group("All of them", result.views)] if len(groups) > 1 else [])]:
+        _show(each)
+    if note := check_same_code(result):
+        progress.note(note)
+    if "kbuffer-deep" not in options.techniques and techniques == "all":
+        progress.note("kbuffer-deep is left out: give a bundle with --bundle.")
+    print(out / "index.html")
+
+
+def _show(shown: Group) -> None:
+    from services.bench.groups import offline, said_budget, said_technique
+
+    print(f"\n{shown.title}: {len(shown.views)} view{'s' if len(shown.views) > 1 else ''}")
+    with_path = any(row.flicker is not None for row in shown.rows)
+    headings = ("technique", "budget", "ms", "MSE e-5", "linear e-5", "occupied e-5", "q", "/ optimum")
+    headings += ("PSNR", "SSIM", "FLIP", "captured", "k", "pool", "total", *(("flicker e-3",) if with_path else ()))
+    print_columns(
+        headings,
+        [[said_technique(row.key), said_budget(row.key), *_cells(row, with_path)] for row in shown.rows],
+    )
+    if marks := offline(shown):
+        print()
+        print_columns(
+            ("offline allocation", "budget", "MSE e-5", "gap", "captured", "k"),
+            [
+                [
+                    mark.rule,
+                    f"F = {mark.budget_factor:g} WH",
+                    _e5(mark.mse),
+                    None if mark.gap is None else f"{mark.gap:.1e}",
+                    f"{mark.captured:,.0f}",
+                    f"{mark.k[0]}..{mark.k[1]}",
+                ]
+                for mark in marks
+            ],
+        )
+    print("\nms of each pass")
+    print_columns(
+        ("technique", "budget", "passes"),
+        [
+            [said_technique(row.key), said_budget(row.key), ", ".join(f"{n} {ms:.1f}" for n, ms in row.passes.items())]
+            for row in shown.rows
+            if row.passes
+        ],
+    )
+
+
+def _cells(row: Row, with_path: bool) -> list[str | None]:
+    if row.problem is not None:
+        return ["no room" if row.key.basis == "memory" else row.problem, *[None] * (12 + with_path)]
+    time = None if row.ms is None else f"{row.ms:.1f} ±{50.0 * (row.spread or 0.0):.0f} %"
+    errors = [_e5(row.mse), _e5(row.mse_linear), _e5(row.mse_occupied), number(row.score), number(row.over_optimum)]
+    if row.family == "exact" or (row.views and row.exact_views == row.views):
+        errors = ["exact", None, None, None, None]
+    kept = None if row.captured is None or row.k is None or not row.k[1] else f"{row.captured:,.0f}"
+    return [
+        time,
+        *errors,
+        None if row.psnr is None else f"{row.psnr:.1f}",
+        None if row.ssim is None else f"{row.ssim:.4f}",
+        None if row.flip is None else f"{row.flip:.4f}",
+        kept,
+        None if kept is None or row.k is None else f"{row.k[0]}..{row.k[1]}",
+        None if row.pool_bytes is None else size(row.pool_bytes),
+        None if row.total_bytes is None else size(row.total_bytes),
+        *([None if row.flicker is None else number(1e3 * row.flicker)] if with_path else []),
+    ]
+
+
+def _e5(error: float | None) -> str | None:
+    if error is None or error > MSE_FLOOR:
+        return None if error is None else number(1e5 * error)
+    return f"≤ {number(1e5 * MSE_FLOOR)}"

@@ -1,0 +1,133 @@
+"""Fine-tuning: the network that a training begins with, and the data set that is replayed so that it is not forgotten.
+
+Rules:
+- a scene is replayed only if the build does not have it, by name or by content: its new version takes its place;
+- what was held out is never replayed, and what the network was trained on cannot be held out: its score would prove
+  nothing;
+- labels of another tail, metric or sample are not mixed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from labeller.dataset import Dataset, open_dataset
+from labeller.dataset_index import INDEX, Labels, ShardEntry
+from labeller.sampling import Sampling
+from schemas.bundle import Manifest, load_manifest
+from schemas.problem import ExitCode, Problem
+from services.options import BuildOptions
+from services.plan import Plan, source_of_version
+from services.progress import Progress
+from services.registry import Registry, bundle_digest
+from services.stages.tasks import METRIC
+from services.tasks import Source
+
+
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """Shards of an earlier data set.
+
+    Attributes:
+        dataset: The data set.
+        entries: Those of its shards that are trained on again.
+    """
+
+    dataset: Dataset
+    entries: tuple[ShardEntry, ...]
+
+    @property
+    def source(self) -> Source:
+        """Names the shards by their content."""
+        files = {entry.file: entry.header_sha256 for entry in self.entries}
+        named = "".join(f"{entry.source.scene}:{entry.header_sha256}\n" for entry in self.entries)
+        digest = hashlib.sha256(named.encode()).hexdigest()
+        return Source(digest=digest, folder=str(self.dataset.folder.resolve()), files=files, trusted=True)
+
+
+def fine_tuning(
+    plan: Plan, options: BuildOptions, registry: Registry, progress: Progress
+) -> tuple[Plan, Replay | None]:
+    """A plan that begins with the network of `--from`, and what is replayed beside its scenes.
+
+    Args:
+        plan: The plan of the build.
+        options: What was asked for.
+        registry: Where names are looked up.
+        progress: Told if there is nothing to replay.
+
+    Raises:
+        Problem: There is no such bundle or data set, they do not fit the build, or a held-out scene is one that the
+            network was trained on.
+    """
+    if options.start is None and options.replay is None:
+        return plan, None
+    seen: dict[str, str] = {}
+    found = options.replay
+    if options.start is not None:
+        source, manifest = _bundle(options.start, registry)
+        seen |= manifest.provenance.scenes
+        plan = replace(plan, start=source)
+        usual = options.state / "datasets" / manifest.name
+        found = found or (usual if (usual / INDEX).is_file() else None)
+    replay = None if found is None else _replay(found, plan)
+    if replay is None:
+        progress.note(
+            f"No data set of {options.start} is known: what it learned may be forgotten. Give --replay FOLDER."
+        )
+    else:
+        seen |= {entry.asset: entry.source.scene for entry in replay.entries}
+        plan = replace(plan, replay=replay.source)
+    _refuse_known(plan, seen)
+    return replace(plan, learned=seen), replay
+
+
+def _bundle(reference: str, registry: Registry) -> tuple[Source, Manifest]:
+    """A bundle in a folder, or `name`, `name@alias`, `name@version` of the registry."""
+    folder = Path(reference)
+    if folder.is_dir():
+        manifest = load_manifest(folder)
+        return Source(digest=bundle_digest(folder), folder=str(folder.resolve()), trusted=True), manifest
+    publication = registry.resolve(reference)
+    return source_of_version(registry.record(publication)), load_manifest(registry.folder(publication))
+
+
+def _replay(folder: Path, plan: Plan) -> Replay | None:
+    """The shards to train on again; None if the build has all of their scenes."""
+    dataset = open_dataset(folder)
+    made, asked = (
+        (dataset.index.labels, dataset.index.sampling),
+        (Labels(tail=plan.tail, g=plan.g, metric=METRIC, k_min=1), Sampling(seed=plan.seed)),
+    )
+    if made != asked:
+        labels, sampling = made
+        raise Problem(
+            f"The data set {folder} is labelled otherwise than this build (tail {plan.tail}, g {plan.g:g}, seed "
+            f"{plan.seed}): tail {labels.tail}, g {labels.g:g}, seed {sampling.seed}.",
+            "Give the build its --tail, --g and --seed, or another data set with --replay.",
+        )
+    names, digests = _own(plan)
+    entries = tuple(
+        entry
+        for entry in dataset.index.shards
+        if entry.split == "train" and entry.asset not in names and entry.source.scene not in digests
+    )
+    return Replay(dataset, entries) if entries else None
+
+
+def _refuse_known(plan: Plan, seen: dict[str, str]) -> None:
+    known = set(seen.values())
+    for scene in plan.scenes:
+        if scene.held_out and scene.source.digest in known:
+            raise Problem(
+                f"The scene {scene.label} is held out, but the network that is begun with was trained on it.",
+                "Hold out another one with --holdout: a test on what was trained on proves nothing.",
+                ExitCode.CHECK_FAILED,
+            )
+
+
+def _own(plan: Plan) -> tuple[set[str], set[str]]:
+    """Names and digests of the build's own scenes."""
+    return {scene.label for scene in plan.scenes}, {scene.source.digest for scene in plan.scenes}

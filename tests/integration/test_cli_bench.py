@@ -1,0 +1,133 @@
+"""`diaphane bench` as users call it, and the committed suite's script on one small scene."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import moderngl
+import pytest
+
+from benchmarks import suite
+from renderer.samples import SAMPLES
+from schemas.bench import BenchResult
+from schemas.problem import ExitCode
+from services.bench.kept import ROWS
+from services.cli.app import run
+
+FAST = ["--size", "48x32", "--repeats", "1", "--alpha", ".33", "--equal-fragments"]
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory, gl: moderngl.Context) -> Path:
+    return SAMPLES["nested_shells"](tmp_path_factory.mktemp("scene"))
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("DIAPHANE_STATE", raising=False)
+    return tmp_path
+
+
+def answer(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
+    assert run(["bench", *arguments, "--json"]) == ExitCode.OK
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return found
+
+
+def test_it_prints_tables_and_leaves_json_plots_and_a_page(
+    scene: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = [
+        "bench",
+        str(scene),
+        *FAST,
+        "-o",
+        "out",
+        "-t",
+        "sbuffer,moment,kbuffer,kbuffer-optimal",
+        "--budgets",
+        "1",
+    ]
+    assert run(command) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert "nested_shells, alpha 0.33, 48x32: 1 view" in out
+    assert "Algorithm 1 (offline), weighted-average tail" in out
+    assert out.strip().endswith("out/index.html")
+    result = BenchResult.model_validate_json((folder / "out" / "bench.json").read_text())
+    cells = {cell.technique: cell for cell in result.views[0].cells}
+    assert cells["sbuffer"].mse == 0.0
+    assert 0.0 < (cells["kbuffer-optimal"].score or 0.0) <= (cells["kbuffer"].score or 0.0)
+    for plot in ("time-error", "error-bytes", "figure6"):
+        assert json.loads((folder / "out" / f"{plot}.vl.json").read_text())["data"]["values"]
+    assert "<svg" in (folder / "out" / "index.html").read_text()
+    assert not (folder / ".diaphane").exists(), "it runs without state"
+
+
+def test_what_was_measured_is_not_measured_again(scene: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    first = answer(capsys, str(scene), *FAST, "-o", "out", "-t", "kbuffer", "--budgets", "1")
+    before = (folder / "out" / ROWS).read_text()
+    assert answer(capsys, str(scene), *FAST, "-o", "out", "-t", "kbuffer", "--budgets", "1")["views"] == first["views"]
+    assert (folder / "out" / ROWS).read_text() == before
+    more = answer(capsys, str(scene), *FAST, "-o", "out", "-t", "kbuffer,moment", "--budgets", "1")
+    assert more["views"][0]["cells"][0] == first["views"][0]["cells"][0]
+    assert [cell["technique"] for cell in more["views"][0]["cells"]] == ["kbuffer", "moment"]
+    added = json.loads((folder / "out" / ROWS).read_text().removeprefix(before))
+    assert [cell["technique"] for cell in added["cells"]] == ["moment"]
+    fresh = answer(capsys, str(scene), *FAST, "-o", "out", "-t", "moment", "--fresh")
+    assert [cell["technique"] for cell in fresh["views"][0]["cells"]] == ["moment"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["missing.usda"], ExitCode.NOT_FOUND, "There is no scene missing.usda."),
+        (["SCENE", "--budgets", "a"], ExitCode.USAGE, "--budgets has 'a', which is no number."),
+        (["SCENE", "-t", "magic"], ExitCode.NOT_FOUND, "There is no technique 'magic'."),
+        (["SCENE", "-t", "kbuffer-deep"], ExitCode.USAGE, "kbuffer-deep needs a bundle."),
+        (["SCENE", "--bundle", "."], ExitCode.NOT_FOUND, ". is not a bundle"),
+    ],
+)
+def test_bad_input_says_what_to_do(
+    scene: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], code: ExitCode, words: str
+) -> None:
+    given = [str(scene) if argument == "SCENE" else argument for argument in arguments]
+    assert run(["bench", *given, "-o", "out"]) == code
+    assert words in capsys.readouterr().err
+
+
+def test_a_scene_that_is_all_opaque_is_nothing_to_measure(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.CreateNew(str(folder / "solid.usda"))
+    UsdGeom.Cube.Define(stage, "/Cube")
+    stage.Save()
+    assert run(["bench", "solid.usda", "-o", "out"]) == ExitCode.NOT_FOUND
+    assert "nothing in it is transparent" in capsys.readouterr().err
+
+
+def test_the_suite_publishes_its_results_and_a_page(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "results").mkdir()
+    monkeypatch.setattr(suite, "RESULTS", folder / "results")
+    monkeypatch.setattr(suite, "PAGE", folder / "BENCH.md")
+    monkeypatch.setattr(suite, "TECHNIQUES", ["sbuffer", "kbuffer", "kbuffer-importance"])
+    options = ["--work", "work", "--only", "nested_shells", "--size", "48x32", "--alpha", ".33,authored"]
+    monkeypatch.setattr("sys.argv", ["suite", *options, "--repeats", "1", "--scenes", "nowhere"])
+    assert suite.main() == 0
+    page = (folder / "BENCH.md").read_text()
+    for heading in ("Figure 6", "Table 1", "Table 2", "Score q", "Every technique", "Where each wins"):
+        assert f"### {heading}" in page
+    (lines,) = (folder / "results").glob("bench-*.jsonl")
+    result = suite.read_lines(lines)
+    assert {(view.scene, view.alpha) for view in result.views} == {("nested_shells", 0.33), ("nested_shells", None)}
+    assert [view.path_frames for view in result.views] == [4, 0]
+    assert all((folder / name).is_file() for name in [f"results/{lines.stem}-figure6-2.svg"])
+    assert str(folder) not in lines.read_text() + page
+    # It goes on where it was: nothing is measured again.
+    rows = (folder / "work" / suite.label() / ROWS).read_text()
+    assert suite.main() == 0
+    assert (folder / "work" / suite.label() / ROWS).read_text() == rows

@@ -1,0 +1,116 @@
+"""Means over views, Pareto fronts, plots, the page, and the committed schema."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from xml.etree import ElementTree
+
+import pytest
+from support.bench import cell, view
+
+from schemas.bench import BenchResult, Times
+from services.bench.bars import error_bars
+from services.bench.groups import group, groups_of, offline
+from services.bench.page import page
+from services.bench.plots import specifications
+from services.bench.schema import FILE, schema_text
+
+VIEWS = (
+    view(
+        cell("kbuffer", mse=1e-4, score=2.0),
+        cell("kbuffer-optimal", mse=1e-6, frame=Times(median=5.0, least=5.0, most=5.0)),
+        cell("kbuffer-importance", mse=1e-5, frame=Times(median=20.0, least=20.0, most=20.0)),
+        cell("moment", mse=1e-3),
+        cell("sbuffer"),
+    ),
+    view(cell("kbuffer", mse=1e-6, score=0.5), cell("sbuffer"), key="b", view="side"),
+    view(cell("kbuffer", exact=True, mse=0.0), key="c", view="far"),
+)
+
+
+def result() -> BenchResult:
+    return BenchResult(command="diaphane bench", created="2026", versions={}, bundle=None, views=VIEWS)
+
+
+def test_errors_are_geometric_means_without_the_views_that_the_budget_holds() -> None:
+    row = next(row for row in group("", VIEWS).rows if row.key.technique == "kbuffer")
+    assert row.mse == pytest.approx(1e-5)
+    assert row.score == pytest.approx(1.0)
+    assert (row.views, row.exact_views) == (3, 1)
+    assert row.ms == 10.0
+    assert row.spread == pytest.approx(0.3)
+    assert row.of_all == pytest.approx(150 / 400)
+
+
+def test_rows_come_without_budget_first_then_by_budget_and_technique() -> None:
+    cells = [cell("kbuffer", 4.0), cell("kbuffer-optimal", 1.0), cell("kbuffer", 1.0), cell("moment"), cell("sbuffer")]
+    rows = group("", [view(*cells)]).rows
+    assert [(r.key.technique, r.key.budget_factor) for r in rows] == [
+        ("sbuffer", None),
+        ("moment", None),
+        ("kbuffer", 1.0),
+        ("kbuffer-optimal", 1.0),
+        ("kbuffer", 4.0),
+    ]
+
+
+def test_offline_allocations_are_those_of_undecided_views() -> None:
+    marks = offline(group("", VIEWS))
+    assert [(mark.rule.partition(",")[0], mark.gap) for mark in marks] == [
+        ("Algorithm 1 (offline)", None),
+        ("certified optimum", 1e-6),
+    ]
+    assert marks[0].mse == pytest.approx(2e-5)
+    assert offline(group("", [view(cell(), fragments=200)])) == []
+
+
+def test_the_front_of_a_plot_is_what_a_renderer_can_run() -> None:
+    plots = specifications(groups_of(VIEWS[:1]))
+    points = {point["technique"]: point for point in plots["time-error.vl.json"]["data"]["values"]}
+    assert {name for name, point in points.items() if point["front"]} == {"kbuffer", "kbuffer-importance"}
+    assert points["sbuffer"]["mse"] is None
+    assert points["moment"]["mse"] == pytest.approx(100.0)
+    bars = plots["figure6.vl.json"]["data"]["values"]
+    assert {bar["technique"] for bar in bars} == {"kbuffer", "kbuffer-optimal", "kbuffer-importance"}
+
+
+def test_every_field_of_a_plot_is_in_its_data() -> None:
+    for plot in specifications(groups_of(VIEWS)).values():
+        fields = set(re.findall(r'"field": "(\w+)"', json.dumps(plot)))
+        assert fields
+        assert all(fields <= set(row) for row in plot["data"]["values"])
+
+
+def test_bars_are_higher_where_the_error_is_larger() -> None:
+    svg = ElementTree.fromstring(error_bars(groups_of(VIEWS[:1]), 2.0, standalone=True))
+    heights = {}
+    for bar in svg.iter("{http://www.w3.org/2000/svg}rect"):
+        title = bar.find("{http://www.w3.org/2000/svg}title")
+        if title is not None and title.text is not None:
+            heights[title.text.split(", ")[-1].partition(":")[0]] = float(bar.get("height", "nan"))
+    # 100, 2 (the oracle), 1 and .1 e-5, from 1.5 times below the least on a logarithmic axis.
+    step = (heights["kbuffer"] - heights["kbuffer-importance"]) / math.log(10.0)
+    assert heights["kbuffer-importance"] - heights["kbuffer-optimal"] == pytest.approx(step * math.log(10.0), abs=0.2)
+    oracle = heights["Algorithm 1 (offline)"] - heights["kbuffer-importance"]
+    assert oracle == pytest.approx(step * math.log(2.0), abs=0.2)
+    assert error_bars(groups_of(VIEWS), 7.0) == ""
+
+
+def test_the_page_shows_its_charts_without_a_network() -> None:
+    html = page(result(), ["time-error.vl.json"], "Two versions.")
+    assert html.count("<svg") > 3
+    assert not re.search(r'(src|href)="https?://', html)
+    assert "@import" not in html
+    assert "Two versions." in html
+    assert "kbuffer-deep was left out" in html
+
+
+def test_results_survive_json() -> None:
+    text = result().model_dump_json(exclude_defaults=True)
+    assert BenchResult.model_validate_json(text) == result()
+
+
+def test_the_committed_schema_is_current() -> None:
+    assert FILE.read_text(encoding="utf-8") == schema_text(), "run `python -m services.bench.schema`"
