@@ -42,7 +42,7 @@ def allocate(
         >>> import labeller, numpy as np
         >>> rgba = np.array([[200, 40, 40, 128], [40, 200, 40, 128], [40, 40, 200, 128]], np.uint8)
         >>> fragments = {"counts": [3], "rgba": rgba, "depth": [1.0, 2.0, 3.0]}
-        >>> [x.k.tolist() for x in labeller.allocate(fragments, [1, 2, 3])]
+        >>> [x.k.tolist() for x in labeller.allocate(fragments, [1, 2, 3], tail="density")]
         [[1], [2], [3]]
 
     Args:

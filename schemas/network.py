@@ -7,4 +7,4 @@ from typing import Literal, get_args
 NetworkSize = Literal["tiny", "small", "full"]
 
 SIZES: tuple[NetworkSize, ...] = get_args(NetworkSize)
-DEFAULT_NETWORK: NetworkSize = "full"
+DEFAULT_NETWORK: NetworkSize = "small"

@@ -20,16 +20,14 @@ PRESETS: Final[dict[Preset, dict[str, Any]]] = {
 """Settings of each preset that differ from the defaults; what else a preset decides is in `trainer.heads`."""
 
 _FRONT: Final = tuple(name for name in FEATURES if name.startswith("front_"))
-_LEAST: Final = ("log_n", "optical_depth", *_FRONT)
-_NEAREST: Final = ("alpha_nearest", "rgb_nearest_r", "rgb_nearest_g", "rgb_nearest_b")
 
 SIZES: Final[dict[NetworkSize, dict[str, Any]]] = {
-    "tiny": {"hidden": (16, 8), "features": _LEAST},
-    "small": {"hidden": (32, 16), "features": (*_LEAST, *_NEAREST)},
-    "full": {},
+    "tiny": {"hidden": (16, 8), "features": ("log_n", "optical_depth", *_FRONT)},
+    "small": {},
+    "full": {"hidden": (64, 32), "steps": 4000},
 }
-"""Settings of each size that differ from the defaults (benchmarks/PREDICTORS.md): `tiny` reads what a binned tail keeps
-of a pixel anyway, `small` also the nearest fragment, `full` all sums."""
+"""Settings of each size that differ from the defaults (benchmarks/PREDICTORS.md). `tiny` reads what a binned tail keeps
+of a pixel anyway, the others all sums."""
 
 
 class TrainConfig(BaseModel):

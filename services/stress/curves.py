@@ -15,7 +15,7 @@ from labeller.curves import composite, error_curves, error_curves_by_g
 from renderer.csr import bin_fragments, sort_fragments
 from schemas.colour import linear_to_srgb
 from schemas.fragments import FragmentDump
-from schemas.tail import DENSITY_G, METRICS, TAILS, MetricName, TailName
+from schemas.tail import DEFAULT_TAIL, DENSITY_G, METRICS, TAILS, MetricName, TailName
 from services.stress.bounds import counted, within
 from services.stress.cases import LONGEST, Case, curve_cases, dump_of
 from services.stress.findings import Finding, Options, worst_of
@@ -68,7 +68,7 @@ def curve_finding(case: Case) -> Finding:
 def _weighted(case: Case) -> Finding:
     """Curves with weights against the reference's errors times them, from 1e-9 to 1e9."""
     weights = np.geomspace(1e-9, 1e9, case.dump.pixels)
-    entries = list(reference_errors(case.dump, "density", "display"))
+    entries = list(reference_errors(case.dump, DEFAULT_TAIL, "display"))
     curves = error_curves(case.dump, weights=weights)
     found = (
         np.array([curves.error[curves.offsets[x.pixel] + x.k] for x in entries]) / weights[[x.pixel for x in entries]]
@@ -80,7 +80,7 @@ def _by_g(case: Case) -> Finding:
     """Curves of several steepnesses in one pass against those of one pass each, bit for bit."""
     wrong, where = 0, ""
     for g, curves in zip(_GS, error_curves_by_g(case.dump, _GS), strict=True):
-        differ = int((curves.error != error_curves(case.dump, g=g).error).sum())
+        differ = int((curves.error != error_curves(case.dump, "density", g).error).sum())
         if differ:
             wrong, where = wrong + differ, f"g {g}"
     return counted("curves.by_g", case.name, wrong, where)

@@ -124,4 +124,6 @@ def test_no_slots_at_all_is_all_tail(frame: Frame, dump: FragmentDump, form: Cha
     none = np.zeros(dump.pixels, dtype=np.int32)
     rendered = render(frame, none, form, "density")
     assert rendered.pool_bytes == 0
-    np.testing.assert_allclose(rendered.linear, composite(dump, none, "density").reshape(rendered.linear.shape), atol=3e-6, rtol=0)
+    np.testing.assert_allclose(
+        rendered.linear, composite(dump, none, "density").reshape(rendered.linear.shape), atol=3e-6, rtol=0
+    )

@@ -30,7 +30,7 @@ def test_any_allocation_looks_as_simulated__tail(frame: Frame, dump: FragmentDum
 @pytest.mark.parametrize("g", [0.0, 2.0])
 def test_the_density_tails_constant_is_the_budgets__g(frame: Frame, dump: FragmentDump, g: float) -> None:
     one = np.minimum(dump.counts, 1).astype(np.int32)
-    rendered = KBufferOptimal(lambda *_: one).render(frame, Budget(0, g=g))
+    rendered = KBufferOptimal(lambda *_: one).render(frame, Budget(0, "density", g))
     np.testing.assert_allclose(rendered.linear, simulate(dump, one, "density", g), atol=3e-6, rtol=0)
 
 
@@ -54,7 +54,7 @@ def test_fixed_k_reserves_the_same_everywhere(frame: Frame, dump: FragmentDump) 
 
 
 def test_importance_spends_its_budget_exactly_and_looks_as_simulated(frame: Frame, dump: FragmentDump) -> None:
-    budget = Budget(dump.total // 3)
+    budget = Budget(dump.total // 3, "density")
     rendered = KBufferImportance().render(frame, budget)
     assert rendered.captured == budget.fragments
     exact = np.abs(

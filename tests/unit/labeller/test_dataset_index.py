@@ -18,6 +18,7 @@ from labeller.dataset import Dataset, open_dataset, read_ahead
 from labeller.dataset_index import INDEX, DatasetIndex, read_index, write_index
 from labeller.shards import read_shard
 from schemas.problem import ExitCode, Problem
+from schemas.tail import DEFAULT_TAIL
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +38,7 @@ def test_the_index_says_what_the_shards_are(folder: Path) -> None:
     index = read_index(folder / INDEX)
     assert index == read_index(folder)
     assert index.code == CODE
-    assert index.labels.tail == "density"
+    assert index.labels.tail == DEFAULT_TAIL
     assert (index.sampling.kind, index.sampling.fraction, index.sampling.seed) == ("stratified", 0.5, 0)
     assert [column.name for column in index.columns][:2] == ["features", "n"]
     for entry in index.shards:

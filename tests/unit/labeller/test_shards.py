@@ -25,6 +25,7 @@ from labeller.shard_file import open_columns, write_columns
 from labeller.shards import Shard, read_rows, read_shard, write_shard
 from renderer.features import FEATURES, derive, gather
 from schemas.problem import ExitCode, Problem
+from schemas.tail import DEFAULT_TAIL, DENSITY_BINS
 
 DUMP = random_dump(40, 30, 8, seed=1)
 CURVES = error_curves(DUMP)
@@ -45,7 +46,7 @@ def shard(path: Path) -> Shard:
 
 
 def test_rows_hold_the_hulls_and_features_of_their_pixels(shard: Shard) -> None:
-    features = derive(gather(DUMP))
+    features = derive(gather(DUMP, DENSITY_BINS[DEFAULT_TAIL]))
     assert shard.features.shape == (len(shard.n), len(FEATURES))
     assert np.array_equal(shard.features, features[shard.pixel])
     assert np.array_equal(shard.n, DUMP.counts[shard.pixel])
@@ -93,7 +94,7 @@ def test_a_view_in_which_nothing_can_be_gained_has_no_rows(tmp_path: Path) -> No
     assert shard.price_range == (0.0, 0.0)
 
 
-@pytest.mark.parametrize("where", [0.0, 0.001, 0.02, 0.3, 0.7, 0.999])
+@pytest.mark.parametrize("where", [0.0, 0.002, 0.02, 0.3, 0.7, 0.999])
 def test_a_changed_byte_is_found_and_the_file_is_named(path: Path, tmp_path: Path, where: float) -> None:
     content = bytearray(path.read_bytes())
     content[int(where * len(content))] ^= 0x11
@@ -156,7 +157,7 @@ def test_a_range_reads_and_verifies_its_own_blocks_alone(tmp_path: Path) -> None
     content = bytearray(path.read_bytes())
     size = 8 + int.from_bytes(content[:8], "little")
     begin = size + json.loads(content[8:size])["features"]["data_offsets"][0]
-    content[begin + 40 * 26 * 4] ^= 1  # row 40 is in the third block
+    content[begin + 40 * len(FEATURES) * 4] ^= 1  # row 40 is in the third block
     path.write_bytes(content)
     for start, stop in ((0, 32), (16, 17), (48, len(whole.n)), (32, 32)):
         np.testing.assert_array_equal(read_rows(path, start, stop).features, whole.features[start:stop])

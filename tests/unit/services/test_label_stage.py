@@ -41,7 +41,7 @@ def facts(folder: Path) -> Facts:
 
 
 def test_every_budget_has_an_answer_in_the_order_asked(facts: Facts) -> None:
-    curves = error_curves(DUMP)
+    curves = error_curves(DUMP, "density")
     assert set(facts["errors"]) == set(RULES)
     for rule in RULES:
         expected = [found.error for found in allocate_curves(DUMP, curves, BUDGETS, rule)]
