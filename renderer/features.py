@@ -85,7 +85,7 @@ def texels_of(names: Sequence[str], binned: bool = False) -> frozenset[int]:
 
 
 def features_glsl(names: Sequence[str] = FEATURES) -> str:
-    """GLSL of `void diaphane_features(in vec4 s[7], out float x[..])`, restricted to `names`, in their order.
+    """GLSL of `void diaphane_features(in vec4 s[TEXELS], out float x[..])`, restricted to `names`, in their order.
 
     Args:
         names: Members of `FEATURES`; anything else raises KeyError.

@@ -72,7 +72,8 @@ class Gathered:
     def pixel_bytes(self) -> int:
         """Bytes a pixel of all this."""
         sums = sum({texture.glo: _SUM_BYTES.get(texture.dtype, 0) for texture in self.sums}.values())
-        return sums + (8 if self.nearest_colour is not None else 0) + front_bytes(self.bins)
+        nearest = sum(4 for buffer in (self.nearest_colour, self.nearest_facing) if buffer is not None)
+        return sums + nearest + front_bytes(self.bins)
 
     @property
     def pass_bytes(self) -> int:
@@ -328,12 +329,13 @@ class Frame:
         z_max.bind_to_storage_buffer(Z_MAX)
         if NEAREST in texels:
             gathered.nearest_colour = self.buffer(self.pixels, 0xFFFFFFFF)
-            gathered.nearest_facing = self.buffer(self.pixels, 0)
             gathered.nearest_colour.bind_to_storage_buffer(NEAREST_COLOUR)
+        if what == "gather-nearest":
+            gathered.nearest_facing = self.buffer(self.pixels, 0)
             gathered.nearest_facing.bind_to_storage_buffer(NEAREST_FACING)
         # Each sum that is there has the next colour attachment, and after them the bins.
         places = {f"SUMS{texel}": place for place, texel in enumerate(blended)}
-        sums = {**places, "NEAREST": int(NEAREST in texels)}
+        sums = {**places, "NEAREST": 2 if what == "gather-nearest" else int(NEAREST in texels)}
         binned = self._bin_targets(bins) if bins else []
         together = len(made) + len(binned) <= TARGETS
         if texels and ((binned and not together) or not binned):
@@ -344,6 +346,7 @@ class Frame:
             self.draw_transparent("gather/gather.frag", self.target([*before, *binned]), defines)
             gathered.bins, gathered.front = bins, self._pack(bins, binned)
         self.ctx.memory_barrier()
+        self.target([]).use()  # a context keeps alive what is bound: the targets, long after the last use of them
         return gathered
 
     def _zero_targets(self, count: int, dtype: str) -> list[moderngl.Texture]:

@@ -135,7 +135,7 @@ def parse_tail(text: str) -> TailName:
     for tail in TAILS:
         if tail == text:
             return tail
-    raise Problem(f"There is no tail '{text}'.", f"Use one of {', '.join(TAILS)}: --tail density.")
+    raise Problem(f"There is no tail '{text}'.", f"Use one of {', '.join(TAILS)}.")
 
 
 def parse_network(text: str) -> NetworkSize:

@@ -24,6 +24,7 @@ from services.progress import Progress
 from services.registry import Registry, bundle_digest
 from services.stages.tasks import METRIC
 from services.tasks import Source
+from trainer.config import TrainConfig
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +57,7 @@ def fine_tuning(
         plan: The plan of the build.
         options: What was asked for.
         registry: Where names are looked up.
-        progress: Told if there is nothing to replay.
+        progress: Told if there is nothing to replay, or the network is of another size than was asked for.
 
     Raises:
         Problem: There is no such bundle or data set, they do not fit the build, or a held-out scene is one that the
@@ -70,6 +71,9 @@ def fine_tuning(
         source, manifest = _bundle(options.start, registry)
         seen |= manifest.provenance.scenes
         plan = replace(plan, start=source)
+        if manifest.hidden != TrainConfig.sized(plan.network).hidden:
+            units = "-".join(map(str, manifest.hidden))
+            progress.note(f"The network keeps the size of {options.start}, {units} units; --network does not change it.")
         usual = options.state / "datasets" / manifest.name
         found = found or (usual if (usual / INDEX).is_file() else None)
     replay = None if found is None else _replay(found, plan)

@@ -19,15 +19,16 @@ PRESETS: Final[dict[Preset, dict[str, Any]]] = {
 }
 """Settings of each preset that differ from the defaults; what else a preset decides is in `trainer.heads`."""
 
+_ALPHA: Final = ("alpha_mean", "alpha_std", "rgb_alpha_r", "rgb_alpha_g", "rgb_alpha_b", "depth_std")
 _FRONT: Final = tuple(name for name in FEATURES if name.startswith("front_"))
 
 SIZES: Final[dict[NetworkSize, dict[str, Any]]] = {
     "tiny": {"hidden": (16, 8), "features": ("log_n", "optical_depth", *_FRONT)},
-    "small": {},
+    "small": {"features": tuple(name for name in FEATURES if name not in _ALPHA)},
     "full": {"hidden": (64, 32), "steps": 4000},
 }
 """Settings of each size that differ from the defaults (benchmarks/PREDICTORS.md). `tiny` reads what a binned tail keeps
-of a pixel anyway, the others all sums."""
+of a pixel anyway, `small` leaves out the sums that gain nothing beside depth bins, `full` reads all."""
 
 
 class TrainConfig(BaseModel):

@@ -140,6 +140,10 @@ class FrameAllocation:
             self._run("count", None)
             self._run("choose", 1)
 
+    def forget_curves(self) -> None:
+        """Let go of the curves: the slots are placed, and nothing else reads them."""
+        self._buffers.pop(_CURVES, None)
+
     def place(self) -> moderngl.Buffer:
         """The offsets of every pixel's slots, uint32 [P+1]: slots at the price, and what is left by pixel index."""
         self._run("blocks", self._groups)

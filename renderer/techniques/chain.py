@@ -32,6 +32,8 @@ from schemas.tail import DENSITY_BINS, MAX_EXPONENT, TailName
 
 SLOT_BYTES = 8
 """Depth and packed colour."""
+RANGE_BYTES = 12
+"""n and depth range of a pixel."""
 
 _EXTENSIONS = frozenset({"GL_NV_shader_atomic_int64", "GL_ARB_gpu_shader_int64"})
 _EMPTY = 0xFFFFFFFF
@@ -69,6 +71,7 @@ def render_chain(
     n: NDArray[np.integer],
     budget: Budget,
     gathered: Gathered | None = None,
+    before: int = 0,
 ) -> Rendered:
     """Capture the nearest fragments into given slots, add the tail, resolve.
 
@@ -79,7 +82,8 @@ def render_chain(
         slots: int [P], slots a pixel gets; may exceed n(p), then some stay empty.
         n: int [P], fragments of each pixel.
         budget: Tail, its constant, and the form of the chain; `sum slots` is not checked against it here.
-        gathered: What the technique has gathered to choose its slots, if anything.
+        gathered: What the technique has gathered to choose its slots, if anything. It stays, whatever the tail reads.
+        before: Bytes a pixel that the technique needed at once to choose them.
 
     Returns:
         The picture; passes in order, memory as allocated.
@@ -88,8 +92,12 @@ def render_chain(
         Problem: The pool is larger than a storage buffer may be, or the driver lacks the form that was asked for.
     """
     complete = bool((slots >= n).all())
+    own = gathered
     if not complete:
         gathered = gathered_for_tail(frame, budget, gathered)
+    beside = 0 if own is None or own is gathered else own.pixel_bytes
+    sums = [each.pass_bytes + (beside if each is gathered else 0) for each in (own, gathered) if each is not None]
+    before = max(before, RANGE_BYTES + max(sums, default=0))
     needed = ["count"] if gathered is None else ["count", gathered.name]
     clock = Clock(frame.ctx)
     with clock.measure("prefix"):
@@ -105,7 +113,11 @@ def render_chain(
         passes={**frame.passes("opaque", *needed), **clock.passes},
         captured=int(k.sum(dtype=np.int64)),
         pool_bytes=SLOT_BYTES * total,
-        pixel_bytes=chain_bytes(gathered, None if complete else budget.tail),
+        # There is no pool before.
+        pixel_bytes=max(
+            chain_bytes(gathered, None if complete else budget.tail) + beside,
+            before - SLOT_BYTES * total // frame.pixels,
+        ),
         skips={**frame_skips(frame), TAIL: int(complete)},
     )
 
@@ -177,7 +189,7 @@ def render_complete(frame: Frame, n: NDArray[np.integer], budget: Budget) -> Ren
 def chain_bytes(gathered: Gathered | None, tail: TailName | None) -> int:
     """Bytes a pixel: offsets, n and depth range, the tail's targets if there is one, what the gather pass left."""
     targets = 0 if tail is None else 16 if tail in DENSITY_BINS else 2 * 16
-    return 4 + 12 + targets + (0 if gathered is None else gathered.pixel_bytes)
+    return 4 + RANGE_BYTES + targets + (0 if gathered is None else gathered.pixel_bytes)
 
 
 def _is_one_pass(ctx: moderngl.Context, budget: Budget, total: int) -> bool:

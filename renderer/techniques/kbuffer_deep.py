@@ -29,6 +29,7 @@ from renderer.programs import Defines
 from renderer.screen import read_linear
 from renderer.techniques.base import Budget, Rendered
 from renderer.techniques.chain import (
+    RANGE_BYTES,
     SLOT_BYTES,
     chain_bytes,
     draw_chain,
@@ -47,8 +48,6 @@ Solver = Literal["gpu", "cpu"]
 _GROUP = 64
 _DISPATCH = 65535 * _GROUP
 """Pixels of one dispatch: the least maximum of work groups that GL promises."""
-_RANGE_BYTES = 12
-"""n and depth range of a pixel."""
 
 # Storage bindings of kbuffer-deep/*.comp; their textures are bound in the order of their declarations.
 _PIXELS, _Z_MIN, _Z_MAX, _NEAREST, _RESULT = range(5)
@@ -64,13 +63,18 @@ class _Prediction:
     gathered: Gathered
     curves: moderngl.Buffer
     passes: dict[str, float]
-    gather_bytes: int
+    before_bytes: int
     k_min: int
     occupied: int
 
     def serves(self, frame: Frame, fragments: int) -> bool:
         """Whether a budget of a frame can be solved with it: with a lower k_min more pixels need curves."""
         return self.frame() is frame and int(fragments >= self.occupied) >= self.k_min
+
+
+def _before_bytes(gathered: Gathered) -> int:
+    """Bytes a pixel at most until fragments are captured: while sums are gathered, or while the network runs."""
+    return RANGE_BYTES + max(gathered.pass_bytes, gathered.pixel_bytes + LIST_BYTES + CURVE_BYTES)
 
 
 class KBufferDeep:
@@ -82,6 +86,8 @@ class KBufferDeep:
             "GPU" is the CPU, where a shader's matrix products do not use its vector units well.
         solver: Where the slots are chosen: `gpu` in compute passes, `cpu` in numpy with two readbacks; None: where the
             network runs, importances on the CPU. The counts are the same but for ties and roundings.
+        keeps_curves: Whether what the network answers on the GPU stays there while fragments are captured: eight bytes
+            a pixel, with which another budget of the same frame needs no inference.
 
     Raises:
         Problem: The bundle is damaged or not understood.
@@ -90,7 +96,14 @@ class KBufferDeep:
 
     name = "kbuffer-deep"
 
-    def __init__(self, bundle: Path, inference: Inference = "glsl", solver: Solver | None = None) -> None:
+    def __init__(
+        self,
+        bundle: Path,
+        inference: Inference = "glsl",
+        solver: Solver | None = None,
+        *,
+        keeps_curves: bool = False,
+    ) -> None:
         self.manifest = load_manifest(bundle)
         if solver == "gpu" and (inference == "onnx" or self.manifest.head != "gain-curve"):
             raise ValueError("the GPU solves gain curves that GLSL predicts")
@@ -107,6 +120,7 @@ class KBufferDeep:
         self._network = OnnxNetwork(bundle / ONNX) if inference == "onnx" else None
         in_frame = inference == "glsl" and self.manifest.head == "gain-curve"
         self._solver = solver or ("gpu" if in_frame else "cpu")
+        self._keeps_curves = keeps_curves
         self._allocation: GpuAllocation | None = None
         self._prediction: _Prediction | None = None
 
@@ -125,7 +139,7 @@ class KBufferDeep:
             self._allocation = GpuAllocation(frame.ctx)
         kept = self._prediction if self._prediction and self._prediction.serves(frame, budget.fragments) else None
         gathered = frame.gather("gather", self._texels, self._bins) if kept is None else kept.gathered
-        gather_bytes = gathered.pass_bytes if kept is None else kept.gather_bytes
+        before = _before_bytes(gathered) if kept is None else kept.before_bytes
         clock = Clock(frame.ctx)
         with clock.measure("select"):
             allocation = self._allocation.select(frame.gpu.programs, counts, frame.pixels, budget.fragments)
@@ -140,6 +154,9 @@ class KBufferDeep:
             allocation.solve(curves)
         with clock.measure("prefix"):
             offsets = allocation.place()
+        if not self._keeps_curves:
+            allocation.forget_curves()
+            del curves
         for_tail = gathered_for_tail(frame, budget, gathered)
         read = [] if for_tail is None or for_tail.name == "gather" else [for_tail.name]
         image = draw_chain(frame, clock, offsets, budget.fragments, budget, for_tail, complete=False)
@@ -147,13 +164,13 @@ class KBufferDeep:
         # The frame is over: what follows are its statistics.
         state = allocation.read_state()
         k = np.diff(np.frombuffer(offsets.read(), dtype=np.uint32).astype(np.int64)).astype(np.int32)
-        if kept is None and not state.complete:
+        if kept is None and self._keeps_curves and not state.complete:
             predicted = {"predict": clock.passes["predict"]}
             self._prediction = _Prediction(
-                weakref.ref(frame), gathered, curves, predicted, gather_bytes, state.k_min, state.occupied
+                weakref.ref(frame), gathered, curves, predicted, before, state.k_min, state.occupied
             )
         pool_bytes = SLOT_BYTES * budget.fragments
-        before = _RANGE_BYTES + LIST_BYTES + CURVE_BYTES + gather_bytes  # while the network runs; there is no pool yet
+        during = chain_bytes(for_tail, budget.tail) + (CURVE_BYTES if self._keeps_curves else 0)
         skips = {PREDICTOR: int(state.complete), SETTLED_PIXELS: state.settled, TAIL: 0}
         return Rendered(
             linear=linear,
@@ -161,7 +178,7 @@ class KBufferDeep:
             passes={**frame.passes("opaque", "count", "gather", *read), **clock.passes},
             captured=int(k.sum(dtype=np.int64)),
             pool_bytes=pool_bytes,
-            pixel_bytes=max(chain_bytes(for_tail, budget.tail) + CURVE_BYTES, before - pool_bytes // frame.pixels),
+            pixel_bytes=max(during, before - pool_bytes // frame.pixels),  # there is no pool before
             skips={**frame_skips(frame), **skips, UNREAD_SUMS: self._unread},
         )
 
@@ -183,7 +200,11 @@ class KBufferDeep:
         gathered = frame.gather("gather", self._texels, self._bins)
         clock = Clock(frame.ctx)
         slots, settled = self._allocate(frame, n, budget.fragments, clock)
-        rendered = render_chain(frame, slots, n, budget, gathered)
+        # What is read back of every open pixel, and the list of them.
+        columns = len(self.manifest.outputs if self._network is None else self.manifest.features)
+        answers = 4 * (1 + columns) * (int(np.count_nonzero(n)) - settled)
+        before = RANGE_BYTES + gathered.pixel_bytes - (-answers // frame.pixels)
+        rendered = render_chain(frame, slots, n, budget, gathered, before)
         skips = {**rendered.skips, SETTLED_PIXELS: settled, UNREAD_SUMS: self._unread}
         shared = frame.passes("opaque", "count", "gather")
         return replace(rendered, passes={**shared, **clock.passes, **rendered.passes}, skips=skips)

@@ -15,6 +15,8 @@ _STANDALONE = (
     "text{font:11px system-ui,sans-serif;fill:#808080}.grid{stroke:#808080;stroke-opacity:.25;fill:none}"
     ".axis{stroke:#808080;fill:none}"
 )
+_LETTER, _MOST_LETTERS = 6.4, 16
+"""Width of a letter, and how many of a line under a cluster are shown."""
 _BAR, _GAP, _LEFT, _TOP, _PLOT, _BOTTOM = 10.0, 22.0, 62.0, 34.0, 220.0, 62.0
 
 
@@ -32,12 +34,13 @@ def error_bars(groups: Sequence[Group], factor: float, standalone: bool = False)
         return ""
     names = list(dict.fromkeys(name for _, bars in shown for name in bars))
     low, high = min(errors) / 1.5, max(errors) * 1.5
-    cluster = _BAR * len(names) + _GAP
+    lines = [line for group, _ in shown for line in _lines(group)]
+    cluster = max(_BAR * len(names) + _GAP, _LETTER * max(map(len, lines)) + 6.0)
     width = max(_LEFT + cluster * len(shown), _LEFT + sum(map(_legend_width, names))) + 10.0
     height = _TOP + _PLOT + _BOTTOM
     parts = [_axes(low, high, width)]
     for place, (group, bars) in enumerate(shown):
-        parts.append(_cluster(group, bars, names, (low, high), _LEFT + place * cluster))
+        parts.append(_cluster(group, bars, names, (low, high), _LEFT + (place + 0.5) * cluster))
     parts.append(_legend(names))
     style = f"<style>{_STANDALONE}</style>" if standalone else ""
     label = escape(f"Squared error within F = {factor:g} WH, by scene and technique")
@@ -73,35 +76,37 @@ def _axes(low: float, high: float, width: float) -> str:
 
 
 def _cluster(
-    group: Group, bars: Mapping[str, float], names: Sequence[str], span: tuple[float, float], left: float
+    group: Group, bars: Mapping[str, float], names: Sequence[str], span: tuple[float, float], middle: float
 ) -> str:
     parts = []
     for name, error in bars.items():
-        x, y = left + 0.5 * _GAP + _BAR * names.index(name), _y(error, span)
+        x, y = middle + _BAR * (names.index(name) - 0.5 * len(names)), _y(error, span)
         parts.append(
             f'<rect x="{x:.1f}" y="{y:.1f}" width="{_BAR - 1}" height="{_TOP + _PLOT - y:.1f}" '
-            f'fill="{_colour(names, name)}">'
+            f'{_fill(names, name)}>'
             f"<title>{escape(f'{group.title}, {name}: {number(error)}e-5')}</title></rect>"
         )
-    middle = left + 0.5 * (_GAP + _BAR * len(names))
-    scene, _, rest = group.title.partition(", ")
-    for line, text in enumerate((scene, *rest.split(", "))):
+    for line, text in enumerate(_lines(group)):
         y = _TOP + _PLOT + 15 + 13 * line
-        parts.append(f'<text class="tick" text-anchor="middle" x="{middle:.1f}" y="{y}">{escape(text[:16])}</text>')
+        parts.append(f'<text class="tick" text-anchor="middle" x="{middle:.1f}" y="{y}">{escape(text)}</text>')
     return "".join(parts)
+
+
+def _lines(group: Group) -> list[str]:
+    return [line[:_MOST_LETTERS] for line in group.title.split(", ")]
 
 
 def _legend(names: Sequence[str]) -> str:
     parts, x = [], _LEFT
     for name in names:
-        parts.append(f'<rect x="{x:.0f}" y="8" width="10" height="10" fill="{_colour(names, name)}"/>')
+        parts.append(f'<rect x="{x:.0f}" y="8" width="10" height="10" {_fill(names, name)}/>')
         parts.append(f'<text class="tick" x="{x + 14:.0f}" y="17">{escape(name)}</text>')
         x += _legend_width(name)
     return "".join(parts)
 
 
 def _legend_width(name: str) -> float:
-    return 26.0 + 6.4 * len(name)
+    return 26.0 + _LETTER * len(name)
 
 
 def _y(value: float, span: tuple[float, float]) -> float:
@@ -110,5 +115,8 @@ def _y(value: float, span: tuple[float, float]) -> float:
     return _TOP + _PLOT * (1.0 - share)
 
 
-def _colour(names: Sequence[str], name: str) -> str:
-    return PALETTE[names.index(name) % len(PALETTE)]
+def _fill(names: Sequence[str], name: str) -> str:
+    """A colour of its own: the palette, then the palette in paler."""
+    times, colour = divmod(names.index(name), len(PALETTE))
+    paler = f' fill-opacity="{0.5**times:g}"' if times else ""
+    return f'fill="{PALETTE[colour]}"{paler}'

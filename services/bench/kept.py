@@ -28,6 +28,7 @@ class Kept:
 
     def __init__(self, folder: Path, resume: bool) -> None:
         self._path = folder / ROWS
+        self._asked: set[str] = set()
         self.views: list[BenchView] = []
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -52,17 +53,28 @@ class Kept:
         self.views.append(view)
 
     def missing(self, key: str, planned: Iterable[CellKey]) -> list[CellKey]:
-        """The cells of a view that no line has."""
+        """The cells of a view that no line has; it is one of those that this run asks for."""
+        self._asked.add(key)
         done = {cell.key for view in self.views if view.key == key for cell in view.cells}
         return [cell for cell in planned if cell not in done]
 
     def merged(self) -> tuple[BenchView, ...]:
-        """Views in the order in which they were begun; the cells of all lines of a view together, later ones win."""
+        """Views in the order in which they were begun; the cells of all lines of a view together, later ones win.
+
+        Of a view that was measured with several settings (repeats, camera path, an edited scene, ...), only those that
+        this run asks for are given, else the latest: a mean over settings would say nothing.
+        """
         found: dict[str, BenchView] = {}
         for view in self.views:
             before = found.get(view.key)
             found[view.key] = view if before is None else _together(before, view)
-        return tuple(found.values())
+        chosen: dict[tuple[object, ...], BenchView] = {}
+        for view in found.values():
+            place = (view.scene, view.alpha, view.width, view.height, view.view)
+            before = chosen.get(place)
+            if before is None or view.key in self._asked or before.key not in self._asked:
+                chosen[place] = view
+        return tuple(chosen.values())
 
 
 def _together(before: BenchView, after: BenchView) -> BenchView:

@@ -70,8 +70,9 @@ def charts_of(shown: Group) -> Drawn:
     """Time against error, and memory against error, at equal fragments."""
     rows = [_chart_row(row) for row in (*measured(shown.rows, "none"), *measured(shown.rows, "fragments"))]
     svgs = [charts.error_chart(rows, shown.title, cost) for cost in (charts.TIME, charts.MEMORY)]
-    known = [row.technique for row in rows if row.technique in charts.MARKS]
-    return Drawn(tuple(svg for svg in svgs if svg), charts.legend(known))
+    # Points without a budget have their names beside them.
+    numbered = [row.technique for row in rows if row.budget_factor]
+    return Drawn(tuple(svg for svg in svgs if svg), charts.legend(numbered))
 
 
 def said_machine(view: BenchView) -> str:

@@ -178,10 +178,13 @@ def _show(shown: Group) -> None:
 def _cells(row: Row, with_path: bool) -> list[str | None]:
     if row.problem is not None:
         return ["no room" if row.key.basis == "memory" else row.problem, *[None] * (12 + with_path)]
-    time = None if row.ms is None else f"{row.ms:.1f} ±{50.0 * (row.spread or 0.0):.0f} %"
+    spread = f" ±{50.0 * row.spread:.0f} %" if row.spread else ""
+    time = None if row.ms is None else f"{row.ms:.1f}{spread}"
     errors = [_e5(row.mse), _e5(row.mse_linear), _e5(row.mse_occupied), number(row.score), number(row.over_optimum)]
-    if row.family == "exact" or (row.views and row.exact_views == row.views):
+    if row.family == "exact":
         errors = ["exact", None, None, None, None]
+    elif row.views and row.exact_views == row.views:
+        errors = ["F ≥ N", None, None, None, None]  # not always exact: the fixed k-buffer's F is spread evenly
     kept = None if row.captured is None or row.k is None or not row.k[1] else f"{row.captured:,.0f}"
     return [
         time,

@@ -16,7 +16,7 @@ from trainer.bundle import load_bundle
 from trainer.log import read_log
 from trainer.train import TrainConfig, train
 from trainer.views import ShardView, open_views
-from trainer.weights import save_weights
+from trainer.weights import Weights, save_weights
 
 FINE_TUNING = 0.25
 """Learning rate of a training that begins with a champion's weights, as a multiple of the usual one: the full rate
@@ -32,11 +32,11 @@ def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
     Raises:
         Problem: There is nothing to learn from.
     """
-    config = _config(task)
+    start = None if task.bundle is None else load_bundle(desk.bundle(task)).weights
+    config = _config(task, start)
     shards = [desk.store.fetch(need) / SHARD for need in task.needs]
     views = open_views(shards, [asset.partition(":")[0] for asset in task.inputs])
     replay = [] if task.replay is None else _replayed(task.replay)
-    start = None if task.bundle is None else load_bundle(desk.bundle(task)).weights
     checkpoint = desk.checkpoint(task)
     log, page = checkpoint.with_suffix(".jsonl"), checkpoint.with_name(f"{task.name}.html")
 
@@ -60,12 +60,16 @@ def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
     log.unlink(missing_ok=True)
 
 
-def _config(task: Task) -> TrainConfig:
+def _config(task: Task, start: Weights | None) -> TrainConfig:
+    """Settings of the training. A network that is begun with keeps its own inputs and units."""
     given: dict[str, Any] = {"seed": task.params["seed"], "patience": task.params.get("patience", 0)}
     if task.params["steps"] is not None:
         given["steps"] = task.params["steps"]
     config = TrainConfig.sized(task.params["network"], **given)
-    return config if task.bundle is None else config.model_copy(update={"lr": FINE_TUNING * config.lr})
+    if start is None:
+        return config
+    own = {"features": start.features, "hidden": start.hidden}
+    return config.model_copy(update={**own, "lr": FINE_TUNING * config.lr})
 
 
 def _replayed(source: Source) -> list[ShardView]:

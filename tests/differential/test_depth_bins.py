@@ -83,4 +83,4 @@ def test_beside_bins_sums_are_half_floats(frame: Frame, dump: FragmentDump, bins
         truth = expected[:, 4 * texel : 4 * texel + 3]
         # Each of the n additions, and what is added, is cut to 11 bits.
         assert (np.abs(found - truth) <= (dump.counts[:, None] + 2) * np.abs(truth) * 2.0**-10 + 1e-6).all()
-    assert gathered.pass_bytes == 5 * 8 + 8 + 2 * bins + 4 + front_bytes(bins)
+    assert gathered.pass_bytes == 5 * 8 + 4 + 2 * bins + 4 + front_bytes(bins)

@@ -131,7 +131,7 @@ def test_nothing_is_read_back_before_the_picture(
 
 
 def test_another_budget_of_a_frame_needs_no_inference(bundle: Path, fresh: Frame, dump: FragmentDump) -> None:
-    deep, alone = KBufferDeep(bundle), KBufferDeep(bundle)
+    deep, alone = KBufferDeep(bundle, keeps_curves=True), KBufferDeep(bundle)
     first = deep.render(fresh, Budget(dump.total // 2))
     again = deep.render(fresh, Budget(dump.total // 3))
     assert again.passes["predict"] == first.passes["predict"]
@@ -203,7 +203,7 @@ def test_features_are_given_back_before_fragments_are_captured(
 ) -> None:
     gathered = fresh.gather("gather", texels_of(network.features)).pixel_bytes
     # n, depth range, list, curves and all sums; then offsets, the first sums and the tail's targets, with the pool.
-    before, after = 12 + 4 + 8 + gathered, 12 + 4 + 8 + 16 + 32
+    before, after = 12 + 4 + 8 + gathered, 12 + 4 + 16 + 32
     few = deep.render(fresh, Budget(dump.total // 10, "density"))
     assert few.pixel_bytes == max(before - few.pool_bytes // fresh.pixels, after)
     many = deep.render(fresh, Budget(dump.total - 1, "density"))
@@ -240,7 +240,7 @@ def test_only_what_the_bundle_reads_is_gathered(
     full = network.features == FEATURES
     assert rendered.skips[UNREAD_SUMS] == (0 if full else 2)
     gathered = frame.gather("gather", texels_of(network.features))
-    assert gathered.pixel_bytes == (5 * 16 + 8 if full else 3 * 16 + 8)
+    assert gathered.pixel_bytes == (5 * 16 + 4 if full else 3 * 16 + 4)
     assert rendered.skips[SETTLED_PIXELS] == np.count_nonzero(dump.counts == 1)
 
 

@@ -14,7 +14,9 @@ layout(std430, binding = 2) readonly buffer Farthest { uint z_max[]; };
 #endif
 #if NEAREST
 layout(std430, binding = 3) buffer NearestColour { uint nearest_colour[]; };
+#if NEAREST == 2
 layout(std430, binding = 4) buffer NearestFacing { uint nearest_facing[]; };
+#endif
 #endif
 uniform int width;
 
@@ -80,7 +82,9 @@ void main() {
 #if NEAREST
     if (z == z_min[p]) {  // ties: the smaller packed colour, as in the sorted dump
         atomicMin(nearest_colour[p], pack(stored));
+#if NEAREST == 2
         atomicMax(nearest_facing[p], uint(floor(facing() * 255.0 + 0.5)));
+#endif
     }
 #endif
 }

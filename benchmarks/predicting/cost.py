@@ -1,0 +1,105 @@
+"""What a way to allocate costs a pixel, and the budget that it leaves of a given memory."""
+
+from __future__ import annotations
+
+from collections.abc import Set
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any, Final
+
+from renderer.allocation.gpu import CURVE_BYTES, LIST_BYTES
+from renderer.features import FEATURES, texels_of
+from renderer.frame import NEAREST, Gathered
+from renderer.techniques.chain import SLOT_BYTES, chain_bytes
+from schemas.tail import DENSITY_BINS, TailName
+from trainer.weights import Weights
+
+FIXED_BYTES: Final = 64
+"""Beside its pool, what a fixed k-buffer with the `density` tail needs a pixel: the memory that all are given."""
+
+_RANGE_BYTES: Final = 12
+"""n and depth range."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """What a pixel costs, the pool of fragments aside.
+
+    Attributes:
+        weights: Numbers of the network.
+        multiply_adds: Of one run of it.
+        feature_bytes: What it reads of a pixel beside n and the depth range, while that is gathered.
+        gather_bytes: All that is alive while sums are gathered and the network runs. There is no pool yet.
+        capture_bytes: All that is alive while fragments are captured.
+    """
+
+    weights: int
+    multiply_adds: int
+    feature_bytes: int
+    gather_bytes: int
+    capture_bytes: int
+
+    def budget(self, total: int, pixels: int) -> int | None:
+        """Fragments that fit into so many bytes together with everything else, F; None: not even the gather pass fits.
+
+        What is alive is `max(capture, gather - 8 F / pixels) + 8 F / pixels` a pixel: sums are dead before the first
+        fragment is captured, so they may lie where the pool will be.
+        """
+        if max(self.gather_bytes, self.capture_bytes) * pixels > total:
+            return None
+        return (total - self.capture_bytes * pixels) // SLOT_BYTES
+
+
+def memory_of(multiple: int, pixels: int) -> int:
+    """M, bytes: a pool of `multiple` slots a pixel, and what fixed k needs beside it."""
+    return (SLOT_BYTES * multiple + FIXED_BYTES) * pixels
+
+
+def network_cost(weights: Weights, tail: TailName) -> Cost:
+    """Of `kbuffer-deep` with a network.
+
+    Args:
+        weights: The network; features that are not in `renderer.features.FEATURES` cost nothing to gather: n and
+            depths are there anyway.
+        tail: That the frame uses.
+    """
+    bins = DENSITY_BINS.get(tail, 0)
+    names = [name for name in weights.features if name in FEATURES]
+    read = texels_of(names, binned=bool(bins)) | (frozenset() if bins else {0})
+    gathered = _gathered(read, bins)
+    return Cost(
+        weights=sum(weight.size + bias.size for weight, bias in weights.layers),
+        multiply_adds=sum(weight.size for weight, _ in weights.layers),
+        feature_bytes=gathered.pass_bytes,
+        gather_bytes=_RANGE_BYTES + max(gathered.pass_bytes, gathered.pixel_bytes + LIST_BYTES + CURVE_BYTES),
+        capture_bytes=_chain(tail),
+    )
+
+
+def rule_cost(tail: TailName, nearest: bool) -> Cost:
+    """Of a rule without a network: the tail's own sums only.
+
+    Args:
+        tail: That the frame uses.
+        nearest: Whether the rule reads the nearest fragment.
+    """
+    features = _tail_sums(tail, frozenset({NEAREST}) if nearest else frozenset()).pass_bytes
+    return Cost(0, 0, features, _RANGE_BYTES + features, _chain(tail))
+
+
+def _chain(tail: TailName) -> int:
+    """Bytes a pixel while fragments are captured: what the tail reads stays."""
+    return chain_bytes(_tail_sums(tail, frozenset()), tail)
+
+
+def _tail_sums(tail: TailName, others: frozenset[int]) -> Gathered:
+    own = frozenset({0}) if tail == "density" else frozenset()
+    return _gathered(own | others, DENSITY_BINS.get(tail, 0), is_facing=NEAREST in others)
+
+
+def _gathered(texels: Set[int], bins: int, is_facing: bool = False) -> Gathered:
+    """What a gather pass of these texels leaves, as far as its size goes: nothing of it is on a GPU."""
+    stand_in: Any = SimpleNamespace
+    sums = [stand_in(glo=texel, dtype="f2" if bins else "f4") for texel in texels if texel < NEAREST]
+    nearest = stand_in() if NEAREST in texels else None
+    return Gathered("gather", sums, nearest, stand_in() if is_facing else None, bins=bins)

@@ -1,0 +1,278 @@
+"""The figures of `benchmarks.predictors` as a page, and its plots."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
+
+from benchmarks.labelling.plot import Labels, Points, log_log
+from benchmarks.predicting.summary import cost_of, front, score
+from benchmarks.predicting.variants import DEFAULT
+
+Found = Mapping[str, Any]
+
+SMALL, TINY = 1.1, 1.3
+"""Score that a `small` and a `tiny` bundle may have, relative to the best."""
+
+_ADDS_PLOT: Final = "predictors-multiply-adds.svg"
+_BYTES_PLOT: Final = "predictors-bytes.svg"
+
+_HEAD = """\
+# Predictors, measured
+
+```
+python -m benchmarks.predictors --scenes ../shared/scenes --work FOLDER \\
+    --out benchmarks/results/predictors.json --page benchmarks/PREDICTORS.md
+```
+
+**Score.** `q = (MSE + 1e-7) / (MSE of the oracle + 1e-7)` of a view at F = W H x 1, 2, 4 where F < N, k_min 1. The
+oracle is DHOIT's own optimal k-buffer: Algorithm 1, offline, with its tail. Tables give geometric means over views;
+*score* is that of the three columns. Below 1 is better than the oracle. Errors are of the stored fragments composited
+with the tail, every pixel of the view, in display space.
+
+**Unseen.** Every asset is held out once: networks are trained on the assets of the other folds and scored on it.
+Held-out assets have no say in a training, not even in when it ends.
+
+**Equal memory.** All get 8 F + 64 W H bytes, what fixed k with the `density` tail has needed beside a pool of F slots.
+Whoever needs less a pixel has more slots for it; what a gather pass needs before fragments are captured may lie in the
+pool's memory. The oracle has F for nothing. A dash: the gather pass alone does not fit.
+
+**Cost.** Multiply-adds of one run of the network; *sums* are bytes a pixel that the gather pass writes, *gather* all
+that is alive then, *capture* all that is alive beside the pool while fragments are captured.
+"""
+
+_TITLES: Final = {
+    "variants": "Tails of the product",
+    "bundles": "Sizes of the product",
+    "sizes": "Hidden layers",
+    "features": "What the network reads",
+    "losses": "Training",
+    "seeds": "Seeds",
+    "labels": "Labels of another tail than the deployed one",
+    "presets": "Presets",
+    "augmentation": "More opacities to train on",
+    "inputs": "Neighbourhoods, views and feedback",
+}
+
+_NOTES: Final = {
+    "labels": "Rows with the labels of `density` have no depth bins either: compare with the network that reads none.",
+    "presets": "DHOIT's network as printed (`paper`: Eq. 3, floor only) and with its labels' scale and fill repaired.",
+    "inputs": (
+        "Trials in the benchmark only. `neighbourhood`: also 3x3 means of log n and optical depth; `view-means`: means "
+        "over the view; `view-normalised`: features relative to their view. Feedback: after a frame, every pixel's "
+        "curve is moved half the way to what its last core fragment gained, once or twice, and the frame is solved "
+        "again. `error`: the gain itself, which nobody knows in a frame; `colour`: how much the pixel's colour changed."
+    ),
+}
+
+
+def page(found: Found) -> str:
+    """Markdown of what was measured."""
+    parts = [_HEAD, _circumstances(found)]
+    variants: Mapping[str, Found] = found["variants"]
+    if variants:
+        parts += [_sizes(variants), _parts(variants)]
+    if "rules" in found:
+        parts.append(_rules(found["rules"]))
+    if "tails" in found:
+        parts.append(_tails(found["tails"]))
+    if DEFAULT in variants:
+        parts.append(_assets(variants, [name for name in (DEFAULT, "density-8", "density") if name in variants]))
+    return "\n".join(parts)
+
+
+def plots(found: Found) -> dict[str, str]:
+    """SVG files by name."""
+    variants = {name: row for name, row in found["variants"].items() if row["is_product"]}
+    if not variants:
+        return {}
+    made = {}
+    for file, title, cost in (
+        (_ADDS_PLOT, "multiply-adds a pixel", "multiply_adds"),
+        (_BYTES_PLOT, "bytes a pixel that the gather pass writes", "feature_bytes"),
+    ):
+        points = {name: (float(row["cost"][cost]), score(row["q"])) for name, row in variants.items()}
+        series: dict[str, Points] = {"front": [points[name] for name in front(points)]}
+        for tail in sorted({row["tail"] for row in variants.values()}):
+            series[tail] = [points[name] for name, row in variants.items() if row["tail"] == tail]
+        labels = Labels(f"Score against {title}", title, "score (1: DHOIT's oracle)")
+        made[file] = log_log(labels, series, proportional=False, apart=[name for name in series if name != "front"])
+    return made
+
+
+def proposals(variants: Mapping[str, Found]) -> dict[str, str]:
+    """Bundle sizes -> variants: the best one, and the cheapest (multiply-adds times bytes) that come near it.
+
+    Args:
+        variants: Those that the product could ship.
+    """
+    scores = {name: score(row["q"]) for name, row in variants.items()}
+    best = min(scores.values())
+    made = {}
+    for size, factor in (("tiny", TINY), ("small", SMALL), ("full", 1.0)):
+        near = [name for name, value in scores.items() if value <= factor * best]
+        made[size] = min(near, key=lambda name: (_price(variants[name]), scores[name]))
+    return made
+
+
+def _price(row: Found) -> int:
+    """Of no unit, so that neither of the two costs has to be weighed against the other."""
+    return int(row["cost"]["multiply_adds"] * row["cost"]["gather_bytes"])
+
+
+def _sizes(variants: Mapping[str, Found]) -> str:
+    shipped = {name: row for name, row in variants.items() if row["is_product"]}
+    if not shipped:
+        return ""
+    points = {
+        name: (row["cost"]["multiply_adds"], row["cost"]["gather_bytes"], score(row["q"]))
+        for name, row in shipped.items()
+    }
+    proposed = proposals(shipped)
+    lines = [f"- `{size}`: {name}" for size, name in proposed.items()]
+    chosen = sorted(front(points), key=lambda name: points[name])
+    return (
+        "## Sizes\n\nProposed: `full` has the best score; `small` and `tiny` have the least product of multiply-adds "
+        f"and bytes while gathering, of those within {100 * (SMALL - 1):.0f} % and {100 * (TINY - 1):.0f} % of its "
+        "score.\n\n" + "\n".join(lines) + "\n\n"
+        f"![Score against multiply-adds](results/{_ADDS_PLOT})\n\n![Score against bytes](results/{_BYTES_PLOT})\n\n"
+        "No other variant of the product is at least as good as one of these in multiply-adds, bytes while gathering "
+        f"and score:\n\n{_table(_COLUMNS, (_row(name, shipped[name]) for name in chosen))}"
+    )
+
+
+def _parts(variants: Mapping[str, Found]) -> str:
+    spread = _spread(variants)
+    sections = []
+    for part, title in _TITLES.items():
+        rows = {name: row for name, row in variants.items() if row["part"] == part}
+        if not rows:
+            continue
+        bases = {row["base"]: None for row in rows.values() if row["base"] in variants and row["base"] not in rows}
+        listed = {**{name: variants[name] for name in bases}, **rows}
+        table = _table(
+            (*_COLUMNS, "against", "change"),
+            ((*_row(name, row), *_change(row, variants, spread)) for name, row in listed.items()),
+        )
+        note = f"{_NOTES[part]}\n\n" if part in _NOTES else ""
+        sections.append(f"## {title}\n\n{note}{table}")
+    if spread is not None:
+        sections.append(f"Seeds alone move the score by {100 * spread:.1f} %; a change below that is marked ~.\n")
+    return "\n".join(sections)
+
+
+def _spread(variants: Mapping[str, Found]) -> float | None:
+    """Largest score of the default's seeds over the least, less 1; None where there is one seed."""
+    scores = [score(row["q"]) for name, row in variants.items() if row["part"] == "seeds" or name == DEFAULT]
+    return max(scores) / min(scores) - 1.0 if len(scores) > 1 else None
+
+
+def _change(row: Found, variants: Mapping[str, Found], spread: float | None) -> tuple[str, str]:
+    base = variants.get(row["base"])
+    if base is None:
+        return "", ""
+    change = score(row["q"]) / score(base["q"]) - 1.0
+    if change > 1.0:
+        return row["base"], f"x {change + 1.0:.3g}"
+    mark = " ~" if spread is not None and abs(change) <= spread else ""
+    return row["base"], f"{100 * change:+.1f} %{mark}"
+
+
+_COLUMNS: Final = (
+    *("", "q x1", "x2", "x4", "score", "/ optimum x1", "x2", "x4", "at memory x1", "x2", "x4"),
+    *("weights", "multiply-adds", "sums", "gather", "capture", "worst q"),
+)
+
+
+def _row(name: str, row: Found) -> tuple[str, ...]:
+    cost = cost_of(row)
+    return (
+        name,
+        *_numbers(row["q"]),
+        _number(score(row["q"])),
+        *_numbers(row["of optimum"]),
+        *_numbers(row["at memory"]),
+        f"{cost.weights:,}",
+        f"{cost.multiply_adds:,}",
+        *(str(value) for value in (cost.feature_bytes, cost.gather_bytes, cost.capture_bytes)),
+        _worst(row["worst"]),
+    )
+
+
+def _rules(rules: Sequence[Found]) -> str:
+    table = _table(
+        ("tail", "rule", "q x1", "x2", "x4", "score", "at memory x1", "x2", "x4", "gather", "capture", "worst q"),
+        (
+            (
+                row["tail"],
+                f"{row['rule']} (offline)" if row["is_offline"] else row["rule"],
+                *_numbers(row["q"]),
+                _number(score(row["q"])),
+                *_numbers(row["at memory"]),
+                str(row["cost"]["gather_bytes"]),
+                str(row["cost"]["capture_bytes"]),
+                _worst(row["worst"]),
+            )
+            for row in rules
+        ),
+    )
+    return (
+        "## Rules without a network, on the same fragments\n\n`optimal` is certified; `greedy` with `weighted-average` "
+        f"is the oracle; `importance` is VKB, `dynamic` the k+-buffer.\n\n{table}"
+    )
+
+
+def _tails(tails: Sequence[Found]) -> str:
+    table = _table(
+        ("tail", "bytes", "optimum x1", "x2", "x4", "proportional x1", "x2", "x4"),
+        (
+            (row["name"], f"{row['bytes']:g}", *_numbers(row["optimal"]), *_numbers(row["proportional"]))
+            for row in sorted(tails, key=lambda row: score(row["optimal"]))
+        ),
+    )
+    return (
+        "## Tails\n\nq of the certified optimum under each tail, and of fragments in proportion to n, best first. "
+        "*Bytes* are what a tail keeps of a pixel beside its weighted sum. Bins are those of METHOD section 2, finer "
+        "in front; *equal* ones equal in depth; *best g*: an oracle chooses the density tail's g of every pixel among "
+        f"0, .25, .5, .75, 1 and 1.5, with its k. Names without a description are the product's tails.\n\n{table}"
+    )
+
+
+def _assets(variants: Mapping[str, Found], names: Sequence[str]) -> str:
+    assets = variants[names[0]]["assets"]
+    rows = (
+        (asset, *(text for name in names for text in _numbers(variants[name]["assets"].get(asset, [None] * 3))))
+        for asset in sorted(assets, key=lambda asset: -score(assets[asset]))
+    )
+    heads = [f"{name} x{multiple}" for name in names for multiple in (1, 2, 4)]
+    return f"## Every asset, held out\n\nWorst first, by `{names[0]}`.\n\n{_table(('asset', *heads), rows)}"
+
+
+def _circumstances(found: Found) -> str:
+    about, machine = found["setting"], found["machine"]
+    width, height = about["size"]
+    return (
+        f"{about['assets']} assets, {about['views']} views at {width}x{height} (at most {about['most']} of a stage and "
+        f"mode: opacity .33 of every surface, and the scene's own), {about['folds']} folds. *{machine['processor']}, "
+        f"{machine['cores']} cores, {machine['memory']}; {found['created']}.*\n"
+    )
+
+
+def _worst(worst: Found) -> str:
+    return f"{_number(worst['q'])} ({worst['asset']}, x{worst['multiple']})"
+
+
+def _numbers(values: Iterable[float | None]) -> tuple[str, ...]:
+    return tuple(_number(value) for value in values)
+
+
+def _number(value: float | None) -> str:
+    if value is None or math.isnan(value):
+        return "-"
+    return f"{value:.3f}" if value < 1.0 else f"{value:.2f}" if value < 10.0 else f"{value:.0f}"
+
+
+def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = ["| " + " | ".join(heads) + " |", "|" + " --- |" * len(heads)]
+    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)]) + "\n"

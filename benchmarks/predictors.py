@@ -1,0 +1,132 @@
+"""Predictors on assets they have not seen: tails, sizes, features, losses, presets, trials, and what each costs.
+
+python -m benchmarks.predictors --scenes ../shared/scenes --work FOLDER \
+    --out benchmarks/results/predictors.json --page benchmarks/PREDICTORS.md
+
+It can be stopped at any time and goes on where it was: dumps, labels, networks and scores lie in `--work`, and are
+made again only where the data or the code that decides them have changed. Without `--scenes` it takes the project's
+own scenes alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from benchmarks.predicting.page import page, plots
+from benchmarks.predicting.store import Store
+from benchmarks.predicting.summary import rules_summary, score, tails_summary, variant_summary
+from benchmarks.predicting.tails import scored
+from benchmarks.predicting.training import Trainings
+from benchmarks.predicting.variants import Variant, variants
+from benchmarks.predicting.views import views_of
+from services.versions import commit, library_versions, machine
+
+PARTS = (
+    *("variants", "bundles", "rules", "features", "sizes", "seeds", "presets", "losses", "labels", "inputs"),
+    *("augmentation", "tails"),
+)
+SIZE = "715x480"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measures what was asked for and is missing; figures and page are written after every row."""
+    given = _parse(arguments)
+    if given.page_only:
+        _write(given.out, given.page, json.loads(given.out.read_text(encoding="utf-8")))
+        return 0
+    store = Store(given.work)
+    rows = views_of(store, given.scenes, given.size, given.views)
+    if not rows:
+        print("No view has more fragments than pixels.", file=sys.stderr)
+        return 1
+    trainings = Trainings(store, rows, given.folds)
+    setting = {
+        "size": list(given.size),
+        "most": given.views,
+        "views": len(rows),
+        "assets": len(trainings.fold),
+        "folds": len(trainings.folds),
+    }
+    found = _before(given.out, setting)
+    for part in given.parts:
+        if part == "rules":
+            found["rules"] = rules_summary(store, rows)
+        elif part == "tails":
+            found["tails"] = tails_summary(scored(store, rows))
+        for variant in _wanted(part, given.variants):
+            start = time.perf_counter()
+            summary = variant_summary(trainings, variant)
+            found["variants"][variant.name] = summary
+            taken = time.perf_counter() - start
+            print(f"{variant.name}: score {score(summary['q']):.3f}, {taken:.0f} s", file=sys.stderr, flush=True)
+            _write(given.out, given.page, found)
+        _write(given.out, given.page, found)
+    print(page(found))
+    return 0
+
+
+def _wanted(part: str, names: Sequence[str] | None) -> list[Variant]:
+    return [x for x in variants().values() if x.part == part and (names is None or x.name in names)]
+
+
+def _before(out: Path | None, setting: dict[str, Any]) -> dict[str, Any]:
+    """What is in the file from earlier runs on the same views, brought up to date."""
+    found: dict[str, Any] = {"variants": {}}
+    if out is not None and out.exists():
+        kept = json.loads(out.read_text(encoding="utf-8"))
+        found = kept if kept["setting"] == setting else found
+    found["setting"] = setting
+    found["created"] = datetime.now(UTC).isoformat(timespec="seconds")
+    found |= {"machine": machine(), "versions": library_versions(), "commit": commit()}
+    return found
+
+
+def _write(out: Path | None, where: Path | None, found: dict[str, Any]) -> None:
+    order = list(variants())
+    known = {name: row for name, row in found["variants"].items() if name in order}
+    found["variants"] = dict(sorted(known.items(), key=lambda item: order.index(item[0])))
+    if out is not None:
+        out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+        for name, svg in plots(found).items():
+            (out.parent / name).write_text(svg, encoding="utf-8")
+    if where is not None:
+        where.write_text(page(found), encoding="utf-8")
+
+
+def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", type=Path, help="Folder with MANIFEST.json; without it, the project's own scenes.")
+    parser.add_argument("--work", type=Path, help="Where dumps, labels, networks and scores are kept.")
+    parser.add_argument("--size", type=_size, default=_size(SIZE), metavar="WxH", help=f"Of the views: {SIZE}.")
+    parser.add_argument("--views", type=int, default=2, help="Most views of a stage, in each mode.")
+    parser.add_argument("--folds", type=int, default=5, help="Parts of the assets, each held out once.")
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
+    parser.add_argument("--variants", nargs="+", metavar="NAME", help="Of the parts, these variants only.")
+    parser.add_argument("--out", type=Path, help="Where the figures go, JSON; plots go beside it.")
+    parser.add_argument("--page", type=Path, help="Where the page goes, Markdown.")
+    parser.add_argument("--page-only", action="store_true", help="Nothing is measured: the page of what is in --out.")
+    given = parser.parse_args(arguments)
+    if given.page_only and given.out is None:
+        parser.error("--page-only needs --out")
+    if given.work is None and not given.page_only:
+        parser.error("--work is missing: a folder for dumps, labels, networks and scores")
+    unknown = set(given.variants or ()) - set(variants())
+    if unknown:
+        parser.error(f"no variants {', '.join(sorted(unknown))}; there are {', '.join(variants())}")
+    return given
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    return int(width), int(height)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
