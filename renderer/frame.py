@@ -234,8 +234,8 @@ class Frame:
         target.use()
         target.clear(0.0, 0.0, 0.0, 0.0)
 
-    def buffer(self, words: int, fill: int) -> moderngl.Buffer:
-        """A storage buffer of uint32, every word set to `fill`.
+    def buffer(self, words: int, fill: int | None) -> moderngl.Buffer:
+        """A storage buffer of uint32, every word set to `fill`; None: to anything.
 
         Raises:
             Problem: It would be larger than a storage buffer may be.
@@ -248,7 +248,8 @@ class Frame:
                 ExitCode.LIMIT,
             )
         made = self.ctx.buffer(reserve=size)
-        made.clear(chunk=np.uint32(fill).tobytes())
+        if fill is not None:
+            made.clear(chunk=np.uint32(fill).tobytes())
         return made
 
     def passes(self, *names: str) -> dict[str, float]:

@@ -126,8 +126,12 @@ def parse_size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def parse_tail(text: str) -> TailName:
+def parse_tail(text: str, option: str = "--tail") -> TailName:
     """The tail of that name.
+
+    Args:
+        text: The name.
+        option: Where it was given.
 
     Raises:
         Problem: There is none.
@@ -135,7 +139,7 @@ def parse_tail(text: str) -> TailName:
     for tail in TAILS:
         if tail == text:
             return tail
-    raise Problem(f"There is no tail '{text}'.", f"Use one of {', '.join(TAILS)}.")
+    raise Problem(f"There is no tail '{text}'.", f"Use one of {', '.join(TAILS)}: {option} {DEFAULT_TAIL}.")
 
 
 def parse_network(text: str) -> NetworkSize:

@@ -73,7 +73,9 @@ def fine_tuning(
         plan = replace(plan, start=source)
         if manifest.hidden != TrainConfig.sized(plan.network).hidden:
             units = "-".join(map(str, manifest.hidden))
-            progress.note(f"The network keeps the size of {options.start}, {units} units; --network does not change it.")
+            progress.note(
+                f"The network keeps the size of {options.start}, {units} units; --network does not change it."
+            )
         usual = options.state / "datasets" / manifest.name
         found = found or (usual if (usual / INDEX).is_file() else None)
     replay = None if found is None else _replay(found, plan)

@@ -171,6 +171,7 @@ class KBufferDeep:
             )
         pool_bytes = SLOT_BYTES * budget.fragments
         during = chain_bytes(for_tail, budget.tail) + (CURVE_BYTES if self._keeps_curves else 0)
+        during += 0 if for_tail is gathered else gathered.pixel_bytes  # beside what another tail than its own reads
         skips = {PREDICTOR: int(state.complete), SETTLED_PIXELS: state.settled, TAIL: 0}
         return Rendered(
             linear=linear,
@@ -187,7 +188,7 @@ class KBufferDeep:
         program = frame.gpu.programs.compute(
             "kbuffer-deep/curves.comp", {**CURVE_DEFINES, **self._defines}, self._texts
         )
-        curves = frame.ctx.buffer(reserve=CURVE_BYTES * frame.pixels)
+        curves = frame.buffer(CURVE_BYTES // 4 * frame.pixels, None)
         self._bind(frame, gathered)
         for binding, buffer in ((_LIST, allocation.listed), (_CURVES, curves)):
             buffer.bind_to_storage_buffer(binding)

@@ -83,7 +83,7 @@ def _cluster(
         x, y = middle + _BAR * (names.index(name) - 0.5 * len(names)), _y(error, span)
         parts.append(
             f'<rect x="{x:.1f}" y="{y:.1f}" width="{_BAR - 1}" height="{_TOP + _PLOT - y:.1f}" '
-            f'{_fill(names, name)}>'
+            f"{_fill(names, name)}>"
             f"<title>{escape(f'{group.title}, {name}: {number(error)}e-5')}</title></rect>"
         )
     for line, text in enumerate(_lines(group)):

@@ -160,7 +160,9 @@ def parse_tails(text: str) -> tuple[TailName, ...]:
     Raises:
         Problem: There is no such tail.
     """
-    return tuple(dict.fromkeys(parse_tail(part) for part in _parts(text, "--tails", "density,exact-coverage")))
+    return tuple(
+        dict.fromkeys(parse_tail(part, "--tails") for part in _parts(text, "--tails", "density,exact-coverage"))
+    )
 
 
 def _parts(text: str, option: str, example: str) -> Sequence[str]:

@@ -38,7 +38,9 @@ def build(
     g: Annotated[float, typer.Option("--g", help="Steepness of the density tail.")] = DENSITY_G,
     seed: Annotated[int, typer.Option("--seed", help="Seed of everything drawn at random.")] = 0,
     steps: Annotated[int | None, typer.Option("--steps", help="Optimiser steps. Default: the trainer's.")] = None,
-    network: Annotated[str, typer.Option("--network", help="Size: tiny, small or full; --from keeps its own.")] = DEFAULT_NETWORK,
+    network: Annotated[
+        str, typer.Option("--network", help="Size: tiny, small or full; --from keeps its own.")
+    ] = DEFAULT_NETWORK,
     patience: Annotated[
         int, typer.Option("--patience", help="Stop after so many validations without a better score; 0: never.")
     ] = 0,

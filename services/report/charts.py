@@ -116,9 +116,10 @@ def error_chart(rows: Sequence[Row], label: str, cost: Cost = TIME) -> str:
     real = [point for (technique, _), point in points.items() if technique.partition(" ")[0] != ORACLE]
     parts = [_axes(frame, f"{cost.axis}, {cost.unit}", "MSE ×1e-5"), _front(frame, pareto_front(real))]
     parts += [_exact_line(frame, x, cost) for x in exact]
+    labels = _Labels(frame)
     for technique in technique_order(name for name, _ in points):
         own = sorted((budget, *points[name, budget]) for name, budget in points if name == technique)
-        parts.append(_series(frame, technique, own, cost))
+        parts.append(_series(frame, technique, own, cost, labels))
     return _svg(frame, parts, f"{label}: {cost.axis} against mean squared error, by technique and budget")
 
 
@@ -157,14 +158,40 @@ def _key(css: str, width: int, drawing: str, text: str) -> str:
     return f'<span class="key">{svg}{escape(text)}</span>'
 
 
-def _series(frame: Frame, technique: str, points: Sequence[tuple[float, float, float]], cost: Cost) -> str:
+class _Labels:
+    """Places the labels of points: the first of four places around the point where no label is yet."""
+
+    _LETTER, _LINE = 6.2, 11.0
+
+    def __init__(self, frame: Frame) -> None:
+        self._right = frame.width
+        self._taken: list[tuple[float, float, float, float]] = []
+
+    def place(self, x: float, y: float, text: str) -> str:
+        """SVG of a label; where all four places are taken, above and to the right."""
+        width = self._LETTER * len(text)
+        places = [(x + 8, y - 6), (x + 8, y + 14), (x - 8 - width, y - 6), (x - 8 - width, y + 14)]
+        left, base = next((place for place in places if self._is_free(*place, width)), places[0])
+        self._taken.append((left, base - self._LINE, left + width, base))
+        end = left < x
+        return _text("point", "end" if end else "start", left + width if end else left, base, text)
+
+    def _is_free(self, left: float, base: float, width: float) -> bool:
+        right, top = left + width, base - self._LINE
+        return right <= self._right and not any(
+            left < x1 and right > x0 and top < y1 and base > y0 for x0, y0, x1, y1 in self._taken
+        )
+
+
+def _series(
+    frame: Frame, technique: str, points: Sequence[tuple[float, float, float]], cost: Cost, labels: _Labels
+) -> str:
     path = " ".join(f"{frame.px(x):.1f},{frame.py(y):.1f}" for _, x, y in points)
     marks = "".join(
         f'<g class="mark">{_mark(technique, frame.px(x), frame.py(y))}'
         f"<title>{escape(title(technique))}{f', F = {budget:g} W H' if budget else ''}: "
         f"{number(x)} {cost.unit}, {number(y)}e-5</title></g>"
-        f'<text class="point" x="{frame.px(x) + 8:.1f}" y="{frame.py(y) - 6:.1f}">'
-        f"{f'{budget:g}' if budget else escape(title(technique))}</text>"
+        f"{labels.place(frame.px(x), frame.py(y), f'{budget:g}' if budget else title(technique))}"
         for budget, x, y in points
     )
     return f'<g class="t-{escape(technique)}"><polyline class="link" points="{path}"/>{marks}</g>'

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import weakref
+from dataclasses import replace
 from pathlib import Path
 
 import moderngl
@@ -10,12 +12,14 @@ import pytest
 from support.training import export_random, random_weights
 
 from labeller.curves import composite
-from renderer.features import FEATURES, SUMS, derive, gather
+from renderer.features import FEATURES, SUMS, derive, gather, texels_of
 from renderer.frame import Frame, front_bytes
-from renderer.techniques import KBufferDeep
+from renderer.techniques import KBufferDeep, technique
 from renderer.techniques.base import Budget
 from schemas.colour import display8
 from schemas.fragments import FragmentDump
+from schemas.limits import LIMITS
+from schemas.problem import Problem
 from schemas.tail import DENSITY_BINS, SHARE_LEVELS, TailName
 
 BINNED = sorted(DENSITY_BINS)
@@ -84,3 +88,52 @@ def test_beside_bins_sums_are_half_floats(frame: Frame, dump: FragmentDump, bins
         # Each of the n additions, and what is added, is cut to 11 bits.
         assert (np.abs(found - truth) <= (dump.counts[:, None] + 2) * np.abs(truth) * 2.0**-10 + 1e-6).all()
     assert gathered.pass_bytes == 5 * 8 + 4 + 2 * bins + 4 + front_bytes(bins)
+
+
+def test_the_targets_of_the_bins_are_gone_when_they_are_packed(
+    frame: Frame, monkeypatch: pytest.MonkeyPatch, ctx: moderngl.Context
+) -> None:
+    fresh = Frame(frame.gpu, frame.view, frame.width, frame.height)
+    made: list[weakref.ref[moderngl.Texture]] = []
+
+    def watched(bins: int) -> list[moderngl.Texture]:
+        found = Frame._bin_targets(fresh, bins)
+        made.extend(weakref.ref(texture) for texture in found)
+        return found
+
+    monkeypatch.setattr(fresh, "_bin_targets", watched)
+    fresh.gather("gather-tail", bins=16)
+    assert len(made) == 5
+    assert all(texture() is None for texture in made), "what is bound is kept, beside the pool"
+
+
+@pytest.mark.parametrize("name", ["kbuffer-dynamic", "kbuffer-importance"])
+def test_the_peak_of_a_small_pool_is_the_gather_pass(frame: Frame, dump: FragmentDump, name: str) -> None:
+    few = technique(name).render(frame, Budget(dump.pixels // 2, "density-16"))
+    nearest = 8 if name == "kbuffer-importance" else 0
+    gathering = 12 + nearest + (2 * 16 + 4) + front_bytes(16)
+    assert few.pixel_bytes == gathering - few.pool_bytes // dump.pixels
+    assert few.total_bytes >= gathering * dump.pixels
+    many = technique(name).render(frame, Budget(dump.total - 1, "density-16"))
+    assert many.pool_bytes > 16 * dump.pixels
+    assert many.pixel_bytes == 4 + 12 + 16 + nearest + front_bytes(16)
+
+
+def test_beside_what_a_runtime_on_the_cpu_reads_back_the_peak_has_its_sums(
+    frame: Frame, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path
+) -> None:
+    export_random(tmp_path, random_weights(11), derive(gather(dump, 16))[dump.counts > 0], gl, "density-16")
+    rendered = KBufferDeep(tmp_path, "onnx").render(frame, Budget(dump.pixels // 2))
+    opened = int(np.count_nonzero(dump.counts > 1))
+    sums = frame.gather("gather", texels_of(FEATURES, binned=True), 16).pixel_bytes
+    reading = (12 + sums) * dump.pixels + 4 * (1 + len(FEATURES)) * opened
+    assert reading <= rendered.total_bytes < reading + 2 * dump.pixels
+
+
+def test_curves_beyond_a_storage_buffer_are_refused(
+    frame: Frame, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    export_random(tmp_path, random_weights(11, FEATURES[:5]), derive(gather(dump))[dump.counts > 0], gl, "density")
+    monkeypatch.setattr("renderer.frame.LIMITS", replace(LIMITS, buffer_bytes=6 * dump.pixels))
+    with pytest.raises(Problem, match="above the limit"):
+        KBufferDeep(tmp_path).render(frame, Budget(dump.pixels, "density"))

@@ -220,7 +220,7 @@ def test_opaque_scene_is_refused_with_the_way_out(tmp_path: Path) -> None:
     )
     assert made.held_out == ()
     assert not made.registry.champion, "one scene proves nothing, so nothing is promoted"
-    assert json.loads(Path(made.registry.folder, "manifest.json").read_text())["tail"]["name"] == "density"
+    assert json.loads(Path(made.registry.folder, "manifest.json").read_text())["tail"]["name"] == "density-16"
 
 
 def test_a_copy_of_a_scene_is_refused_since_the_split_is_by_content(samples: Path, tmp_path: Path) -> None:

@@ -312,7 +312,18 @@ def test_all_options_of_a_job_arrive(server: FakeServer, folder: Path) -> None:
     (folder / "views.json").write_text(json.dumps({"scenes": [{"main": "a.usdz", "views": [camera]}]}))
     options = ["--name", "glass", "--scene", "a.usdz", "--holdout", "b.usdz", "--budgets", "4,1", "--alpha", "0.33"]
     options += ["--views-per-scene", "2", "--size", "64x48", "--tail", "paper", "--g", "0.5", "--seed", "7"]
-    options += ["--steps", "9", "--start-from", "champion", "--promote", "never", "--priority", "high"]
+    options += [
+        "--network",
+        "tiny",
+        "--steps",
+        "9",
+        "--start-from",
+        "champion",
+        "--promote",
+        "never",
+        "--priority",
+        "high",
+    ]
     assert run(["jobs", "submit", "build", *options, "--views", "views.json"]) == ExitCode.OK
     (job,) = server.jobs.values()
     spec = job["spec"]
@@ -334,6 +345,7 @@ def test_all_options_of_a_job_arrive(server: FakeServer, folder: Path) -> None:
         "height": 48,
         "tail": "paper",
         "g": 0.5,
+        "network": "tiny",
         "seed": 7,
         "steps": 9,
         "start_from": "champion",

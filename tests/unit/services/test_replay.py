@@ -101,7 +101,13 @@ def test_it_is_said_when_there_is_nothing_to_replay(plan: Plan, options: BuildOp
     assert replay is None
     assert tuned.replay is None
     assert tuned.start is not None
-    assert "may be forgotten" in heard.notes[0]
+    assert "may be forgotten" in heard.notes[-1]
+
+
+def test_it_is_said_that_a_network_keeps_its_size(plan: Plan, options: BuildOptions) -> None:
+    heard = Heard()
+    fine_tuning(plan, options, NO_REGISTRY, heard)
+    assert any("4 units" in note and "--network" in note for note in heard.notes)
 
 
 def test_a_missing_data_set_is_refused(plan: Plan, options: BuildOptions, tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from support.bench import cell, view
 from schemas.bench import BenchResult, Times
 from services.bench.bars import error_bars
 from services.bench.groups import group, groups_of, offline
-from services.bench.page import page
+from services.bench.page import charts_of, page
 from services.bench.plots import specifications
 from services.bench.schema import FILE, schema_text
 
@@ -96,6 +96,37 @@ def test_bars_are_higher_where_the_error_is_larger() -> None:
     oracle = heights["Algorithm 1 (offline)"] - heights["kbuffer-importance"]
     assert oracle == pytest.approx(step * math.log(2.0), abs=0.2)
     assert error_bars(groups_of(VIEWS), 7.0) == ""
+
+
+def test_what_is_written_under_bars_does_not_overlap() -> None:
+    wide = view(cell("kbuffer"), scene="minecraft_village_caves", alpha=None)
+    other = view(cell("kbuffer"), key="b", scene="two_cylinder_engine", alpha=None)
+    svg = ElementTree.fromstring(error_bars(groups_of([wide, other]), 2.0))
+    texts = [text for text in svg.iter("{http://www.w3.org/2000/svg}text") if text.text == "authored alpha"]
+    first, second = (float(text.get("x", "nan")) for text in texts)
+    assert second - first > 6.0 * len("minecraft_villag")
+
+
+def test_every_bar_of_a_cluster_looks_different() -> None:
+    tails = ("density-16", "density-8", "density", "exact-coverage", "weighted-average")
+    cells = [cell(name, tail=tail) for name in ("kbuffer", "kbuffer-optimal") for tail in tails]
+    svg = ElementTree.fromstring(error_bars(groups_of([view(*cells)]), 2.0))
+    bars = [bar for bar in svg.iter("{http://www.w3.org/2000/svg}rect") if len(bar)]
+    assert len(bars) == 11
+    assert len({(bar.get("fill"), bar.get("fill-opacity")) for bar in bars}) == 11
+
+
+def test_every_mark_with_a_number_is_in_the_legend() -> None:
+    shown = charts_of(group("", [view(cell("kbuffer"), cell("kbuffer-deep", bundle="x"), cell("moment"))]))
+    assert "this bundle" in shown.legend
+    assert "moment" not in shown.legend
+
+
+def test_a_budget_that_holds_every_fragment_is_not_called_exact() -> None:
+    """The fixed k-buffer spreads it over all pixels, and still errs."""
+    html = page(result().model_copy(update={"views": VIEWS[2:]}), [], None)
+    assert "F holds every fragment" in html
+    assert "exact" not in html.partition("<tbody>")[2].partition("</tbody>")[0]
 
 
 def test_the_page_shows_its_charts_without_a_network() -> None:

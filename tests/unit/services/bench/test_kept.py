@@ -23,7 +23,7 @@ def test_cells_that_a_line_has_are_not_missing(tmp_path: Path) -> None:
 def test_lines_of_a_view_are_one_result_and_later_cells_win(tmp_path: Path) -> None:
     kept = Kept(tmp_path, resume=True)
     kept.add(view(cell("kbuffer", mse=1e-3), cell("moment")))
-    kept.add(view(cell("kbuffer"), key="b"))
+    kept.add(view(cell("kbuffer"), key="b", view="side"))
     kept.add(view(cell("kbuffer", mse=2e-3), cell("adaptive"), seconds=2.0))
     first, second = Kept(tmp_path, resume=True).merged()
     assert [c.technique for c in first.cells] == ["kbuffer", "moment", "adaptive"]
@@ -63,3 +63,14 @@ def test_a_folder_that_is_a_file_is_a_problem(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(Problem, match="cannot be written"):
         Kept(tmp_path / "file", resume=True)
+
+
+def test_a_view_with_other_settings_is_shown_once_as_this_run_asks_for_it(tmp_path: Path) -> None:
+    kept = Kept(tmp_path, resume=True)
+    kept.add(view(cell("kbuffer", mse=1e-3), key="once"))
+    kept.add(view(cell("kbuffer", mse=1e-3), key="elsewhere", view="side"))
+    kept.add(view(cell("kbuffer", mse=1e-3), key="thrice"))
+    assert [v.key for v in Kept(tmp_path, resume=True).merged()] == ["thrice", "elsewhere"]
+    again = Kept(tmp_path, resume=True)
+    again.missing("once", [])
+    assert [v.key for v in again.merged()] == ["once", "elsewhere"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -80,6 +81,15 @@ def test_the_oracle_is_not_on_the_front() -> None:
 def test_rows_without_times_make_no_scatter() -> None:
     assert charts.error_chart(rows([measurement(total_ms=None)]), "bottles") == ""
     assert charts.error_chart(rows([measurement(mse=0.0, exact=True)]), "bottles") == ""
+
+
+def test_labels_of_neighbours_stand_apart() -> None:
+    names = ("adaptive", "multilayer", "moment")
+    measured = [replace(rows([measurement(name, total_ms=10.0)])[0], budget_factor=0.0) for name in names]
+    svg = ElementTree.fromstring(charts.error_chart(measured, "bottles"))
+    labels = [text for text in svg.iter("text") if text.get("class") == "point"]
+    assert {text.text for text in labels} == set(names)
+    assert len({(text.get("text-anchor"), text.get("y")) for text in labels}) == len(names)
 
 
 def test_one_point_is_drawn_too() -> None:

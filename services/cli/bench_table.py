@@ -1,0 +1,75 @@
+"""The tables of `diaphane bench`."""
+
+from __future__ import annotations
+
+from services.bench.groups import Group, Row, offline, said_budget, said_technique
+from services.cli.lines import print_columns, size
+from services.summary import MSE_FLOOR, number
+
+
+def show(shown: Group) -> None:
+    """Print the views of a group: techniques, offline allocations, and the time of each pass."""
+    print(f"\n{shown.title}: {len(shown.views)} view{'s' if len(shown.views) > 1 else ''}")
+    with_path = any(row.flicker is not None for row in shown.rows)
+    headings = ("technique", "budget", "ms", "MSE e-5", "linear e-5", "occupied e-5", "q", "/ optimum")
+    headings += ("PSNR", "SSIM", "FLIP", "captured", "k", "pool", "total", *(("flicker e-3",) if with_path else ()))
+    print_columns(
+        headings,
+        [[said_technique(row.key), said_budget(row.key), *_cells(row, with_path)] for row in shown.rows],
+    )
+    if marks := offline(shown):
+        print()
+        print_columns(
+            ("offline allocation", "budget", "MSE e-5", "gap", "captured", "k"),
+            [
+                [
+                    mark.rule,
+                    f"F = {mark.budget_factor:g} WH",
+                    _e5(mark.mse),
+                    None if mark.gap is None else f"{mark.gap:.1e}",
+                    f"{mark.captured:,.0f}",
+                    f"{mark.k[0]}..{mark.k[1]}",
+                ]
+                for mark in marks
+            ],
+        )
+    print("\nms of each pass")
+    print_columns(
+        ("technique", "budget", "passes"),
+        [
+            [said_technique(row.key), said_budget(row.key), ", ".join(f"{n} {ms:.1f}" for n, ms in row.passes.items())]
+            for row in shown.rows
+            if row.passes
+        ],
+    )
+
+
+def _cells(row: Row, with_path: bool) -> list[str | None]:
+    if row.problem is not None:
+        return ["no room" if row.key.basis == "memory" else row.problem, *[None] * (12 + with_path)]
+    spread = f" ±{50.0 * row.spread:.0f} %" if row.spread else ""
+    time = None if row.ms is None else f"{row.ms:.1f}{spread}"
+    errors = [_e5(row.mse), _e5(row.mse_linear), _e5(row.mse_occupied), number(row.score), number(row.over_optimum)]
+    if row.family == "exact":
+        errors = ["exact", None, None, None, None]
+    elif row.views and row.exact_views == row.views:
+        errors = ["F ≥ N", None, None, None, None]  # not always exact: the fixed k-buffer's F is spread evenly
+    kept = None if row.captured is None or row.k is None or not row.k[1] else f"{row.captured:,.0f}"
+    return [
+        time,
+        *errors,
+        None if row.psnr is None else f"{row.psnr:.1f}",
+        None if row.ssim is None else f"{row.ssim:.4f}",
+        None if row.flip is None else f"{row.flip:.4f}",
+        kept,
+        None if kept is None or row.k is None else f"{row.k[0]}..{row.k[1]}",
+        None if row.pool_bytes is None else size(row.pool_bytes),
+        None if row.total_bytes is None else size(row.total_bytes),
+        *([None if row.flicker is None else number(1e3 * row.flicker)] if with_path else []),
+    ]
+
+
+def _e5(error: float | None) -> str | None:
+    if error is None or error > MSE_FLOOR:
+        return None if error is None else number(1e5 * error)
+    return f"≤ {number(1e5 * MSE_FLOOR)}"
