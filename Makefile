@@ -31,7 +31,7 @@ setup-tests: setup
 	@scripts/setup-tests.sh
 
 test: setup-tests lint ## lint, then all tests
-	$(BIN)/pytest $(ARGS)
+	@BIN=$(BIN) scripts/test.sh $(ARGS)
 
 format: setup ## rewrite the sources in the house style
 	$(BIN)/ruff format .
