@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# All tests in two processes: those of single modules beside the first of the others, which use one core. What is
-# sensitive to time (tests/integration) comes when the former are through. With arguments: pytest with these.
+# All tests: those of single modules beside those of the renderer and the engine's kills, which use one core each; then
+# tests/integration by itself, for some of it measures times. With arguments: pytest with these.
 set -uo pipefail
 pytest="${BIN:-.venv/bin}/pytest"
 if [ "$#" -gt 0 ]; then
@@ -10,9 +10,9 @@ said=$(mktemp)
 trap 'rm -f "$said"' EXIT
 "$pytest" -p no:cacheprovider tests/unit tests/property > "$said" 2>&1 &
 modules=$!
-"$pytest" tests/attacks tests/chaos tests/differential tests/docs tests/golden tests/integration
-others=$?
-wait "$modules"
-status=$?
+worst=0
+"$pytest" tests/attacks tests/chaos tests/differential tests/docs tests/golden || worst=$?
+wait "$modules" || worst=$?
 cat "$said"
-exit $((others > status ? others : status))
+"$pytest" tests/integration || worst=$?
+exit "$worst"
