@@ -322,6 +322,9 @@ def _exponents(
     out: NDArray[np.float64],
 ) -> None:
     """What `exp(-.)` of is a fragment's weight in the tail, float64 [n]."""
+    if not look.bins and look.tail != DENSITY:
+        out[:] = 0.0
+        return
     total = 0.0
     for i in range(len(rgba)):
         total += look.optical[rgba[i, 3]]
@@ -329,6 +332,6 @@ def _exponents(
         binned_exponents(depth, rgba, total, front, out)
         return
     extent = np.float64(depth[-1]) - np.float64(depth[0])
-    steepness = g * total / extent if look.tail == DENSITY and extent > 0.0 else 0.0
+    steepness = g * total / extent if extent > 0.0 else 0.0
     for i in range(len(out)):
         out[i] = steepness * (np.float64(depth[i]) - np.float64(depth[0]))

@@ -217,12 +217,17 @@ class Frame:
 
     def float_targets(self, *components: int) -> list[moderngl.Texture]:
         """Float32 textures of the frame's size, zero, one for each number of components."""
-        made = [
-            self._spare.pop()
-            if count == 4 and self._spare
-            else self.ctx.texture((self.width, self.height), count, dtype="f4")
-            for count in components
-        ]
+        return self._zeroed(
+            [
+                self._spare.pop()
+                if count == 4 and self._spare
+                else self.ctx.texture((self.width, self.height), count, dtype="f4")
+                for count in components
+            ]
+        )
+
+    def _zeroed(self, made: list[moderngl.Texture]) -> list[moderngl.Texture]:
+        """The same textures, of the frame's size, as targets."""
         for texture in made:
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
             self.zero(texture)
@@ -286,8 +291,8 @@ class Frame:
 
         Args:
             what: Which pass.
-            texels: Of a `gather`: which texels of `renderer.features.SUMS` are read; None: all. The first, and the
-                nearest fragment's facing if its colour is asked for, are always there.
+            texels: Of a `gather`: which texels of `renderer.features.SUMS` are read; None: all. The first is always
+                there without bins.
             bins: Depth bins that a tail needs (`schemas.tail.DENSITY_BINS`). With them the first texel is there only
                 if it is asked for: the count pass has n, and the bins have the optical depth.
         """
@@ -339,7 +344,7 @@ class Frame:
         sums = {**places, "NEAREST": 2 if what == "gather-nearest" else int(NEAREST in texels)}
         binned = self._bin_targets(bins) if bins else []
         together = len(made) + len(binned) <= TARGETS
-        if texels and ((binned and not together) or not binned):
+        if texels and not (binned and together):
             self.draw_transparent("gather/gather.frag", self.target(list(made.values())), {**sums, "BINS": 0})
         if binned:
             before = list(made.values()) if together else []
@@ -352,11 +357,7 @@ class Frame:
 
     def _zero_targets(self, count: int, dtype: str) -> list[moderngl.Texture]:
         """Textures of four components, zero."""
-        made = [self.ctx.texture((self.width, self.height), 4, dtype=dtype) for _ in range(count)]
-        for texture in made:
-            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-            self.zero(texture)
-        return made
+        return self._zeroed([self.ctx.texture((self.width, self.height), 4, dtype=dtype) for _ in range(count)])
 
     def _bin_targets(self, bins: int) -> list[moderngl.Texture]:
         """The optical depth, float32, and the depth bins, 16 bits each that blending adds and clamps exactly; zero."""

@@ -7,18 +7,15 @@ from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, Final
 
-from renderer.allocation.gpu import CURVE_BYTES, LIST_BYTES
 from renderer.features import FEATURES, texels_of
 from renderer.frame import NEAREST, Gathered
-from renderer.techniques.chain import SLOT_BYTES, chain_bytes
+from renderer.techniques.chain import RANGE_BYTES, SLOT_BYTES, chain_bytes
+from renderer.techniques.kbuffer_deep import before_bytes
 from schemas.tail import DENSITY_BINS, TailName
 from trainer.weights import Weights
 
 FIXED_BYTES: Final = 64
 """Beside its pool, what a fixed k-buffer with the `density` tail needs a pixel: the memory that all are given."""
-
-_RANGE_BYTES: Final = 12
-"""n and depth range."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +68,7 @@ def network_cost(weights: Weights, tail: TailName) -> Cost:
         weights=sum(weight.size + bias.size for weight, bias in weights.layers),
         multiply_adds=sum(weight.size for weight, _ in weights.layers),
         feature_bytes=gathered.pass_bytes,
-        gather_bytes=_RANGE_BYTES + max(gathered.pass_bytes, gathered.pixel_bytes + LIST_BYTES + CURVE_BYTES),
+        gather_bytes=before_bytes(gathered),
         capture_bytes=_chain(tail),
     )
 
@@ -84,7 +81,7 @@ def rule_cost(tail: TailName, nearest: bool) -> Cost:
         nearest: Whether the rule reads the nearest fragment.
     """
     features = _tail_sums(tail, frozenset({NEAREST}) if nearest else frozenset()).pass_bytes
-    return Cost(0, 0, features, _RANGE_BYTES + features, _chain(tail))
+    return Cost(0, 0, features, RANGE_BYTES + features, _chain(tail))
 
 
 def _chain(tail: TailName) -> int:

@@ -2,7 +2,7 @@
 
 Nothing is read back within a frame: the network's curves stay on the GPU, where the one lambda is found that uses the
 budget (`renderer.allocation.gpu`), and the pool has as many slots as the budget allows. What the network has read is
-given back before fragments are captured; its curves are kept, so that another budget of the same frame needs no
+given back before fragments are captured, and so are its curves, unless another budget of the same frame is to need no
 inference.
 """
 
@@ -72,7 +72,7 @@ class _Prediction:
         return self.frame() is frame and int(fragments >= self.occupied) >= self.k_min
 
 
-def _before_bytes(gathered: Gathered) -> int:
+def before_bytes(gathered: Gathered) -> int:
     """Bytes a pixel at most until fragments are captured: while sums are gathered, or while the network runs."""
     return RANGE_BYTES + max(gathered.pass_bytes, gathered.pixel_bytes + LIST_BYTES + CURVE_BYTES)
 
@@ -139,7 +139,7 @@ class KBufferDeep:
             self._allocation = GpuAllocation(frame.ctx)
         kept = self._prediction if self._prediction and self._prediction.serves(frame, budget.fragments) else None
         gathered = frame.gather("gather", self._texels, self._bins) if kept is None else kept.gathered
-        before = _before_bytes(gathered) if kept is None else kept.before_bytes
+        before = before_bytes(gathered) if kept is None else kept.before_bytes
         clock = Clock(frame.ctx)
         with clock.measure("select"):
             allocation = self._allocation.select(frame.gpu.programs, counts, frame.pixels, budget.fragments)
