@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # All tests: those of single modules beside those of the renderer and the engine's kills, which use one core each; then
-# tests/integration by itself, for some of it measures times. With arguments: pytest with these.
+# tests/integration by itself, for it waits for processes that it kills and starts. With arguments: pytest with these.
 set -uo pipefail
 pytest="${BIN:-.venv/bin}/pytest"
 if [ "$#" -gt 0 ]; then

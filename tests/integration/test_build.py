@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import shutil
-import time
 from pathlib import Path
 
 import pytest
@@ -122,11 +121,9 @@ def test_a_shard_that_was_lost_is_there_again_after_the_same_command(
     open_dataset(built.dataset).check(first)
 
 
-def test_same_command_again_does_nothing_and_is_quick(built: BuildResult, samples: Path, state: Path) -> None:
-    started = time.monotonic()
+def test_same_command_again_does_nothing(built: BuildResult, samples: Path, state: Path) -> None:
     again = build(options(samples, state), SilentProgress())
     assert not again.worked
-    assert time.monotonic() - started < 5.0
     assert again.registry.reference == built.registry.reference
     assert again.skipped["views already captured"] == 9
 
