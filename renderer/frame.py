@@ -28,8 +28,6 @@ Gather = Literal["gather-tail", "gather-nearest", "gather"]
 
 NEAREST = 5
 """The texel of `renderer.features.SUMS` that is the nearest fragment; those before it are sums by blending."""
-TARGETS = 8
-"""Colour attachments that every GL 4.5 driver has."""
 BIN_DEFINES: Defines = {
     **{"ROOT_SHARE": ROOT_SHARE, "SHARE_LEVELS": SHARE_LEVELS},
     **{"OPTICAL_UNIT": OPTICAL_UNIT, "BIN_LIMIT": BIN_LIMIT},
@@ -71,14 +69,26 @@ class Gathered:
     @property
     def pixel_bytes(self) -> int:
         """Bytes a pixel of all this."""
-        sums = sum({texture.glo: _SUM_BYTES.get(texture.dtype, 0) for texture in self.sums}.values())
-        nearest = sum(4 for buffer in (self.nearest_colour, self.nearest_facing) if buffer is not None)
-        return sums + nearest + front_bytes(self.bins)
+        return self._sum_bytes + self._nearest_bytes + front_bytes(self.bins)
 
     @property
     def pass_bytes(self) -> int:
-        """Bytes a pixel while it is gathered: until they are packed, bins have two bytes each, and D has four."""
-        return self.pixel_bytes + (2 * self.bins + 4 if self.bins else 0)
+        """Bytes a pixel while it is gathered.
+
+        Bins are gathered first, two bytes each and D with four. When the sums are, they are packed.
+        """
+        if not self.bins:
+            return self.pixel_bytes
+        beside = 0 if self._sum_bytes else self._nearest_bytes  # without sums, the nearest is found in the same pass
+        return max(self.pixel_bytes, front_bytes(self.bins) + 2 * self.bins + 4 + beside)
+
+    @property
+    def _sum_bytes(self) -> int:
+        return sum({texture.glo: _SUM_BYTES.get(texture.dtype, 0) for texture in self.sums}.values())
+
+    @property
+    def _nearest_bytes(self) -> int:
+        return sum(4 for buffer in (self.nearest_colour, self.nearest_facing) if buffer is not None)
 
 
 _SUM_BYTES = {"f4": 16, "f2": 8}
@@ -324,36 +334,45 @@ class Frame:
     def _gather(
         self, what: Gather, texels: frozenset[int], bins: int, z_min: moderngl.Buffer, z_max: moderngl.Buffer
     ) -> Gathered:
+        gathered = Gathered(what, [], bins=bins)
+        z_min.bind_to_storage_buffer(Z_MIN)
+        z_max.bind_to_storage_buffer(Z_MAX)
         blended = sorted(texels - {NEAREST})
+        nearest: Defines = {"NEAREST": 2 if what == "gather-nearest" else int(NEAREST in texels)}
+        if bins:
+            # Before the sums, whose targets need not be there yet: together they would be the peak of the frame.
+            self._make_nearest(gathered, {} if blended else nearest)
+            gathered.front = self._gather_bins(bins, {"NEAREST": 0} if blended else nearest)
         # With bins no tail reads these sums, only a network, and half floats serve it as well (PREDICTORS.md).
         targets = self._zero_targets(len(blended), "f2") if bins else self.float_targets(*[4] * len(blended))
+        if blended:
+            self._make_nearest(gathered, nearest)
+            places: Defines = {f"SUMS{texel}": place for place, texel in enumerate(blended)}
+            self.draw_transparent("gather/gather.frag", self.target(targets), {**places, **nearest, "BINS": 0})
         made = dict(zip(blended, targets, strict=True))
         # Where nothing is blended, a shader gets a texture that it does not read.
         first = next(iter(made.values()), self.background)
-        gathered = Gathered(what, [made.get(texel, first) for texel in range(NEAREST)])
-        z_min.bind_to_storage_buffer(Z_MIN)
-        z_max.bind_to_storage_buffer(Z_MAX)
-        if NEAREST in texels:
-            gathered.nearest_colour = self.buffer(self.pixels, 0xFFFFFFFF)
-            gathered.nearest_colour.bind_to_storage_buffer(NEAREST_COLOUR)
-        if what == "gather-nearest":
-            gathered.nearest_facing = self.buffer(self.pixels, 0)
-            gathered.nearest_facing.bind_to_storage_buffer(NEAREST_FACING)
-        # Each sum that is there has the next colour attachment, and after them the bins.
-        places = {f"SUMS{texel}": place for place, texel in enumerate(blended)}
-        sums = {**places, "NEAREST": 2 if what == "gather-nearest" else int(NEAREST in texels)}
-        binned = self._bin_targets(bins) if bins else []
-        together = len(made) + len(binned) <= TARGETS
-        if texels and not (binned and together):
-            self.draw_transparent("gather/gather.frag", self.target(list(made.values())), {**sums, "BINS": 0})
-        if binned:
-            before = list(made.values()) if together else []
-            defines = {**(sums if together else {"NEAREST": 0}), "BINS": bins, "BIN0": len(before), **BIN_DEFINES}
-            self.draw_transparent("gather/gather.frag", self.target([*before, *binned]), defines)
-            gathered.bins, gathered.front = bins, self._pack(bins, binned)
+        gathered.sums = [made.get(texel, first) for texel in range(NEAREST)]
         self.ctx.memory_barrier()
         self.target([]).use()  # a context keeps alive what is bound: the targets, long after the last use of them
         return gathered
+
+    def _make_nearest(self, gathered: Gathered, nearest: Defines) -> None:
+        """Buffers for the nearest fragment, bound, as far as the pass wants them."""
+        if nearest.get("NEAREST"):
+            gathered.nearest_colour = self.buffer(self.pixels, 0xFFFFFFFF)
+            gathered.nearest_colour.bind_to_storage_buffer(NEAREST_COLOUR)
+        if nearest.get("NEAREST") == 2:
+            gathered.nearest_facing = self.buffer(self.pixels, 0)
+            gathered.nearest_facing.bind_to_storage_buffer(NEAREST_FACING)
+
+    def _gather_bins(self, bins: int, nearest: Defines) -> moderngl.Buffer:
+        """Depth bins by blending, packed; their targets are gone when this returns."""
+        targets = self._bin_targets(bins)
+        defines: Defines = {**nearest, "BINS": bins, "BIN0": 0, **BIN_DEFINES}
+        self.draw_transparent("gather/gather.frag", self.target(targets), defines)
+        self.target([]).use()
+        return self._pack(bins, targets)
 
     def _zero_targets(self, count: int, dtype: str) -> list[moderngl.Texture]:
         """Textures of four components, zero."""

@@ -84,6 +84,12 @@ def rule_cost(tail: TailName, nearest: bool) -> Cost:
     return Cost(0, 0, features, RANGE_BYTES + features, _chain(tail))
 
 
+def gather_costs(tail: TailName) -> list[int]:
+    """Bytes a pixel until fragments are captured, for more and more texels: what decides them is the renderer."""
+    bins = DENSITY_BINS.get(tail, 0)
+    return [before_bytes(_gathered(frozenset(range(texels)), bins)) for texels in range(NEAREST + 2)]
+
+
 def _chain(tail: TailName) -> int:
     """Bytes a pixel while fragments are captured: what the tail reads stays."""
     return chain_bytes(_tail_sums(tail, frozenset()), tail)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.predicting.cost import Cost, memory_of, network_cost, rule_cost
+from benchmarks.predicting.cost import Cost, gather_costs, memory_of, network_cost, rule_cost
 from benchmarks.predicting.feedback import corrected, observed
 from benchmarks.predicting.inputs import changed
 from benchmarks.predicting.labels import labels_of, oracle_of
@@ -59,8 +59,8 @@ def score_key(trainings: Trainings, variant: Variant, fold: int) -> str:
     """Of everything that decides the scores of a fold."""
     store = trainings.store
     scored = [labels_of(store, row, variant.tail).key for row in trainings.rows if not trainings.sees(row, fold)]
-    # Costs come of the renderer: those of a rule change with them.
-    about = (variant.tail, variant.inputs, variant.feedback, variant.turns, asdict(rule_cost(variant.tail, True)))
+    costs = asdict(rule_cost(variant.tail, True)), gather_costs(variant.tail)
+    about = (variant.tail, variant.inputs, variant.feedback, variant.turns, *costs)
     return key_of(trainings.key(variant, fold), about, scored, store.code("scores"), store.code("labels"))
 
 

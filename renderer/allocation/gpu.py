@@ -2,9 +2,10 @@
 
 `renderer.allocation.lattice` is the same in numpy, and says why it is exact. In order:
 
-- `select`: totals of n in blocks, k_min, whether all fits, and a list of the pixels that have a choice;
-- a predictor fills in the curves of the listed pixels (`run_listed` says how many there are);
-- `solve`: rounds of counting at 64 prices, those that are not needed being empty dispatches;
+- `select`: totals of n in blocks, k_min, and whether all fits;
+- a predictor fills in the curves of the pixels that have a choice: n > k_min, unless all fits;
+- `solve`: a list of these pixels, then rounds of counting at 64 prices, those that are not needed being empty
+  dispatches. The list is not there before: what the predictor reads is gone then, and the peak is lower by it;
 - `place`: slots at the found price, the remainder, and their exclusive prefix sum.
 
 Sums stop at 2^31 - 1: no budget is as large, and what stops there is the same in any order. A pixel takes part with at
@@ -36,16 +37,20 @@ STATE = np.dtype(
         *((name, "<u4") for name in ("k_min", "complete", "occupied", "open_pixels", "left", "low_sum")),
         *((name, "<u4") for name in ("listed", "rounds", "warm")),
         *((name, "<i4") for name in ("low", "high")),
-        *((name, "<u4", 3) for name in ("predict_groups", "count_groups")),
+        ("count_groups", "<u4", 3),
         ("edge", "<i4", EDGES),
     ]
 )
 """`allocation/state.glsl`."""
+_COUNT_GROUPS = 44
+"""Byte of `count_groups` in it."""
 
 DEFINES = {"BLOCK": BLOCK, "EDGES": EDGES, "LAST": LAST, "SHIFT": SHIFT, "TURNS": MOST_FRAGMENTS}
 CURVE_DEFINES = {**DEFINES, "MOST_GAIN": MOST_GAIN, "LEAST_RATE": LEAST_RATE, "MOST_RATE": MOST_RATE}
 """Of a shader that writes curves."""
 
+_ACROSS = 1024
+"""Groups in the first of two dimensions."""
 _STATE, _COUNTS, _LIST, _CURVES, _BLOCKS = range(5)
 """Storage bindings of `allocation/*.comp`."""
 
@@ -100,7 +105,8 @@ class FrameAllocation:
     """The passes of one frame; made by `GpuAllocation.select`.
 
     Attributes:
-        listed: uint32 [P+1]: the pixels that have a choice, in any order; `place` turns it into the offsets.
+        listed: uint32 [P+1]: the pixels that have a choice, in any order; `place` turns it into the offsets. Made by
+            `solve`.
     """
 
     def __init__(
@@ -113,29 +119,31 @@ class FrameAllocation:
     ) -> None:
         self._ctx, self._programs, self._pixels = ctx, programs, pixels
         self._groups = pixels // BLOCK + 1  # blocks of pixels + 1 offsets
-        self.listed = ctx.buffer(reserve=4 * (pixels + 1))
+        self.listed: moderngl.Buffer | None = None
         scratch = ctx.buffer(reserve=4 * EDGES * self._groups)
-        self._buffers = {_STATE: state, _COUNTS: counts, _LIST: self.listed, _BLOCKS: scratch}
+        self._buffers = {_STATE: state, _COUNTS: counts, _BLOCKS: scratch}
 
     def select(self, budget: int) -> None:
-        """Totals, k_min, whether all fits, and the list."""
+        """Totals, k_min, and whether all fits."""
         self._run("totals", self._groups)
         self._run("begin", 1, blocks=self._groups, budget=min(budget, CEILING - 1))
-        self._run("list", self._groups)
 
-    def run_listed(self, program: moderngl.ComputeShader, state_binding: int) -> None:
-        """Run a shader of 64 threads a group for every listed pixel; its groups may be in two dimensions."""
+    def run_pixels(self, program: moderngl.ComputeShader, state_binding: int) -> None:
+        """Run a shader of 64 threads a group on every pixel, with the state bound; its groups are in two dimensions."""
         self._buffers[_STATE].bind_to_storage_buffer(state_binding)
-        program.run_indirect(self._buffers[_STATE], _offset("predict_groups"))
+        groups = -(-self._pixels // 64)
+        program.run(min(groups, _ACROSS), -(-groups // _ACROSS))
         self._ctx.memory_barrier()
 
     def solve(self, curves: moderngl.Buffer) -> None:
         """Find the price of the listed pixels' curves; it stays in the state.
 
         Args:
-            curves: float32 [P, 2], the a and rate of `renderer.allocation.lattice.Curves`.
+            curves: float32 [P, 2], the a and rate of `renderer.allocation.lattice.Curves`, where n > k_min.
         """
-        self._buffers |= {_CURVES: curves}
+        self.listed = self._ctx.buffer(reserve=4 * (self._pixels + 1))
+        self._buffers |= {_CURVES: curves, _LIST: self.listed}
+        self._run("list", self._groups)
         for _ in range(ROUNDS):
             self._run("count", None)
             self._run("choose", 1)
@@ -149,6 +157,7 @@ class FrameAllocation:
         self._run("blocks", self._groups)
         self._run("scan", 1, blocks=self._groups)
         self._run("offsets", self._groups)
+        assert self.listed is not None, "solve is before"
         return self.listed
 
     def read_state(self) -> SolvedState:
@@ -167,13 +176,7 @@ class FrameAllocation:
             buffer.bind_to_storage_buffer(binding)
         set_uniforms(program, {"pixels": self._pixels, **uniforms})
         if groups is None:
-            program.run_indirect(self._buffers[_STATE], _offset("count_groups"))
+            program.run_indirect(self._buffers[_STATE], _COUNT_GROUPS)
         else:
             program.run(groups)
         self._ctx.memory_barrier()
-
-
-def _offset(name: str) -> int:
-    """Byte of a member of the state."""
-    assert STATE.fields is not None, "it is a structure"
-    return int(STATE.fields[name][1])

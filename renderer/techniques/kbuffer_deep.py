@@ -22,7 +22,7 @@ from renderer import timing
 from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
 from renderer.allocation.gpu import CURVE_BYTES, CURVE_DEFINES, LIST_BYTES, FrameAllocation, GpuAllocation
 from renderer.features import TEXELS, texels_of
-from renderer.frame import ALL_TEXELS, BIN_DEFINES, Clock, Frame, Gathered
+from renderer.frame import ALL_TEXELS, BIN_DEFINES, Clock, Frame, Gathered, front_bytes
 from renderer.gpu_scene import set_uniforms
 from renderer.onnx_network import OnnxNetwork
 from renderer.programs import Defines
@@ -46,13 +46,15 @@ Inference = Literal["glsl", "onnx"]
 Solver = Literal["gpu", "cpu"]
 
 _GROUP = 64
+FIRST_SUM_BYTES = 16
+"""Of the sums that a tail without bins may read, and that stay."""
 _DISPATCH = 65535 * _GROUP
 """Pixels of one dispatch: the least maximum of work groups that GL promises."""
 
 # Storage bindings of kbuffer-deep/*.comp; their textures are bound in the order of their declarations.
 _PIXELS, _Z_MIN, _Z_MAX, _NEAREST, _RESULT = range(5)
 _COUNTS, _FRONT = 6, 7
-_STATE, _LIST, _CURVES = 0, 4, 5
+_STATE, _CURVES = 0, 5
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +75,9 @@ class _Prediction:
 
 
 def before_bytes(gathered: Gathered) -> int:
-    """Bytes a pixel at most until fragments are captured: while sums are gathered, or while the network runs."""
-    return RANGE_BYTES + max(gathered.pass_bytes, gathered.pixel_bytes + LIST_BYTES + CURVE_BYTES)
+    """Bytes a pixel at most until fragments are captured: gathering, running the network, or choosing slots."""
+    kept = front_bytes(gathered.bins) or FIRST_SUM_BYTES
+    return RANGE_BYTES + CURVE_BYTES + max(gathered.pass_bytes - CURVE_BYTES, gathered.pixel_bytes, kept + LIST_BYTES)
 
 
 class KBufferDeep:
@@ -184,16 +187,15 @@ class KBufferDeep:
         )
 
     def _curves(self, frame: Frame, gathered: Gathered, allocation: FrameAllocation) -> moderngl.Buffer:
-        """Run the network on the listed pixels."""
+        """Run the network on the pixels that have a choice."""
         program = frame.gpu.programs.compute(
             "kbuffer-deep/curves.comp", {**CURVE_DEFINES, **self._defines}, self._texts
         )
         curves = frame.buffer(CURVE_BYTES // 4 * frame.pixels, None)
         self._bind(frame, gathered)
-        for binding, buffer in ((_LIST, allocation.listed), (_CURVES, curves)):
-            buffer.bind_to_storage_buffer(binding)
-        set_uniforms(program, {"width": frame.width})
-        allocation.run_listed(program, _STATE)
+        curves.bind_to_storage_buffer(_CURVES)
+        set_uniforms(program, {"width": frame.width, "pixels": frame.pixels})
+        allocation.run_pixels(program, _STATE)
         return curves
 
     def _render_on_cpu(self, frame: Frame, budget: Budget) -> Rendered:

@@ -87,7 +87,8 @@ def test_beside_bins_sums_are_half_floats(frame: Frame, dump: FragmentDump, bins
         truth = expected[:, 4 * texel : 4 * texel + 3]
         # Each of the n additions, and what is added, is cut to 11 bits.
         assert (np.abs(found - truth) <= (dump.counts[:, None] + 2) * np.abs(truth) * 2.0**-10 + 1e-6).all()
-    assert gathered.pass_bytes == 5 * 8 + 4 + 2 * bins + 4 + front_bytes(bins)
+    sums, binning = 5 * 8 + 4 + front_bytes(bins), 2 * bins + 4 + front_bytes(bins)
+    assert gathered.pass_bytes == max(sums, binning), "the one is gone when the other is gathered"
 
 
 def test_the_targets_of_the_bins_are_gone_when_they_are_packed(
@@ -105,6 +106,24 @@ def test_the_targets_of_the_bins_are_gone_when_they_are_packed(
     fresh.gather("gather-tail", bins=16)
     assert len(made) == 5
     assert all(texture() is None for texture in made), "what is bound is kept, beside the pool"
+
+
+def test_the_targets_of_the_bins_are_gone_when_sums_are_made(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
+    fresh = Frame(frame.gpu, frame.view, frame.width, frame.height)
+    made: list[weakref.ref[moderngl.Texture]] = []
+    alive: list[int] = []
+    make = fresh._zero_targets
+
+    def watched(count: int, dtype: str) -> list[moderngl.Texture]:
+        alive.append(sum(texture() is not None for texture in made))
+        found = make(count, dtype)
+        made.extend(weakref.ref(texture) for texture in found)
+        return found
+
+    monkeypatch.setattr(fresh, "_zero_targets", watched)
+    fresh.gather("gather", frozenset({1, 3, 5}), 16)
+    assert len(made) == 4 + 2
+    assert alive == [0, 0]
 
 
 @pytest.mark.parametrize("name", ["kbuffer-dynamic", "kbuffer-importance"])

@@ -18,10 +18,6 @@ void start(uvec3 total) {
     low_sum = k_min * open_pixels;
     listed = 0u;
     rounds = 0u;
-    uint groups = (open_pixels + 63u) / 64u;
-    predict_groups[1] = (groups + 65534u) / 65535u;
-    predict_groups[0] = min(groups, 65535u);
-    predict_groups[2] = 1u;
     count_groups[0] = (open_pixels + BLOCK - 1u) / BLOCK;
     count_groups[1] = count_groups[2] = 1u;
 }

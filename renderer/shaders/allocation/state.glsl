@@ -12,7 +12,6 @@ layout(std430, binding = 0) buffer State {
     uint warm;         // 1: `low` is the answer of an earlier frame
     int low;           // greatest index of a price known to be within the budget
     int high;          // an index above `low` that is beyond it, or LAST
-    uint predict_groups[3];
     uint count_groups[3];
     int edge[EDGES];   // indices of the prices that the next round counts at
 };

@@ -1,19 +1,19 @@
 #version 450
 // The bundle's network on the gathered sums of every open pixel, for the allocation within the frame: a and 1 / b of
-// log gain(k) = a - b (k-1). The list holds the pixels whose k is not settled by their count alone, so the cost is
-// linear in them; 1 / b is stored so that every later pass has the same number.
+// log gain(k) = a - b (k-1). Pixels whose k their count alone settles have none; 1 / b is stored so that every later pass
+// has the same number.
 layout(local_size_x = 64) in;
 #include "allocation/state.glsl"
 #include "kbuffer-deep/inputs.glsl"
 
-layout(std430, binding = 4) readonly buffer List { uint pixel[]; };
 layout(std430, binding = 5) writeonly buffer Curves { vec2 curve[]; };  // [P], a and 1 / b
+
+uniform uint pixels;
 
 void main() {
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    uint i = 64u * group + gl_LocalInvocationIndex;
-    if (i >= open_pixels) return;
-    uint p = pixel[i];
+    uint p = 64u * group + gl_LocalInvocationIndex;
+    if (p >= pixels || complete == 1u || count[p] <= k_min) return;
     float x[DIAPHANE_FEATURES];
     read_features(int(p), x);
     vec2 gain = diaphane_predict(x).xy;
