@@ -69,26 +69,17 @@ class Gathered:
     @property
     def pixel_bytes(self) -> int:
         """Bytes a pixel of all this."""
-        return self._sum_bytes + self._nearest_bytes + front_bytes(self.bins)
+        sums = sum({texture.glo: _SUM_BYTES.get(texture.dtype, 0) for texture in self.sums}.values())
+        nearest = sum(4 for buffer in (self.nearest_colour, self.nearest_facing) if buffer is not None)
+        return sums + nearest + front_bytes(self.bins)
 
     @property
     def pass_bytes(self) -> int:
         """Bytes a pixel while it is gathered.
 
-        Bins are gathered first, two bytes each and D with four. When the sums are, they are packed.
+        Bins are gathered first, two bytes each and D with four; when all else is, they are packed.
         """
-        if not self.bins:
-            return self.pixel_bytes
-        beside = 0 if self._sum_bytes else self._nearest_bytes  # without sums, the nearest is found in the same pass
-        return max(self.pixel_bytes, front_bytes(self.bins) + 2 * self.bins + 4 + beside)
-
-    @property
-    def _sum_bytes(self) -> int:
-        return sum({texture.glo: _SUM_BYTES.get(texture.dtype, 0) for texture in self.sums}.values())
-
-    @property
-    def _nearest_bytes(self) -> int:
-        return sum(4 for buffer in (self.nearest_colour, self.nearest_facing) if buffer is not None)
+        return max(self.pixel_bytes, front_bytes(self.bins) + 2 * self.bins + 4 if self.bins else 0)
 
 
 _SUM_BYTES = {"f4": 16, "f2": 8}
@@ -340,13 +331,17 @@ class Frame:
         blended = sorted(texels - {NEAREST})
         nearest: Defines = {"NEAREST": 2 if what == "gather-nearest" else int(NEAREST in texels)}
         if bins:
-            # Before the sums, whose targets need not be there yet: together they would be the peak of the frame.
-            self._make_nearest(gathered, {} if blended else nearest)
-            gathered.front = self._gather_bins(bins, {"NEAREST": 0} if blended else nearest)
+            # Before all else, which need not be there yet: together they would be the peak of the frame.
+            gathered.front = self._gather_bins(bins)
         # With bins no tail reads these sums, only a network, and half floats serve it as well (PREDICTORS.md).
         targets = self._zero_targets(len(blended), "f2") if bins else self.float_targets(*[4] * len(blended))
-        if blended:
-            self._make_nearest(gathered, nearest)
+        if texels:
+            if NEAREST in texels:
+                gathered.nearest_colour = self.buffer(self.pixels, 0xFFFFFFFF)
+                gathered.nearest_colour.bind_to_storage_buffer(NEAREST_COLOUR)
+            if what == "gather-nearest":
+                gathered.nearest_facing = self.buffer(self.pixels, 0)
+                gathered.nearest_facing.bind_to_storage_buffer(NEAREST_FACING)
             places: Defines = {f"SUMS{texel}": place for place, texel in enumerate(blended)}
             self.draw_transparent("gather/gather.frag", self.target(targets), {**places, **nearest, "BINS": 0})
         made = dict(zip(blended, targets, strict=True))
@@ -357,19 +352,10 @@ class Frame:
         self.target([]).use()  # a context keeps alive what is bound: the targets, long after the last use of them
         return gathered
 
-    def _make_nearest(self, gathered: Gathered, nearest: Defines) -> None:
-        """Buffers for the nearest fragment, bound, as far as the pass wants them."""
-        if nearest.get("NEAREST"):
-            gathered.nearest_colour = self.buffer(self.pixels, 0xFFFFFFFF)
-            gathered.nearest_colour.bind_to_storage_buffer(NEAREST_COLOUR)
-        if nearest.get("NEAREST") == 2:
-            gathered.nearest_facing = self.buffer(self.pixels, 0)
-            gathered.nearest_facing.bind_to_storage_buffer(NEAREST_FACING)
-
-    def _gather_bins(self, bins: int, nearest: Defines) -> moderngl.Buffer:
+    def _gather_bins(self, bins: int) -> moderngl.Buffer:
         """Depth bins by blending, packed; their targets are gone when this returns."""
         targets = self._bin_targets(bins)
-        defines: Defines = {**nearest, "BINS": bins, "BIN0": 0, **BIN_DEFINES}
+        defines: Defines = {"NEAREST": 0, "BINS": bins, **BIN_DEFINES}
         self.draw_transparent("gather/gather.frag", self.target(targets), defines)
         self.target([]).use()
         return self._pack(bins, targets)

@@ -82,8 +82,9 @@ class BenchCell(CellKey):
         k_max: Most.
         captured_fragments: Sum of k.
         pool_bytes: Size of the fragment pool.
-        pixel_bytes: All other buffers, bytes a pixel.
-        total_bytes: Both.
+        pixel_bytes: All other buffers beside it, bytes a pixel.
+        early_bytes: Most before there is a pool, bytes a pixel.
+        total_bytes: The peak of the frame: pool and what lives beside it, or what was there before.
         score: (mse + LOSSLESS) / (mse of the oracle + LOSSLESS).
         score_display: The same of `mse_display`.
         over_optimum: As `score`, with the certified optimum of the cell's own tail instead of the oracle.
@@ -112,6 +113,7 @@ class BenchCell(CellKey):
     captured_fragments: int | None = Field(default=None, ge=0)
     pool_bytes: int | None = Field(default=None, ge=0)
     pixel_bytes: int | None = Field(default=None, ge=0)
+    early_bytes: int = Field(default=0, ge=0)
     total_bytes: int | None = Field(default=None, ge=0)
     score: float | None = Field(default=None, gt=0.0)
     score_display: float | None = Field(default=None, gt=0.0)

@@ -55,8 +55,8 @@ class Picture:
         k: Least and greatest k of a pixel that has fragments.
         passes: Milliseconds of each pass.
         pool_bytes: Storage that grows with fragments or slots.
-        pixel_bytes: All other buffers, bytes a pixel.
-        total_bytes: Both.
+        pixel_bytes: All other buffers beside it, bytes a pixel.
+        total_bytes: Peak of the frame.
         skips: What was not needed -> how often.
         mse: Against the exact picture, 8-bit sRGB, values in [0,1]; None if it was not compared.
         psnr: dB; None also for no error.

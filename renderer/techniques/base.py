@@ -43,8 +43,8 @@ class Rendered:
         passes: Milliseconds of each pass, in order; shared passes (opaque, count, gather) as first measured.
         captured: Sum of k.
         pool_bytes: Bytes of storage that depend on the number of fragments or slots.
-        pixel_bytes: Bytes a pixel of all other buffers that live at the same time: together with the pool the peak of
-            the frame, also where it comes before the pool is there. The picture itself is not counted.
+        pixel_bytes: Bytes a pixel of all other buffers that live beside the pool. The picture itself is not counted.
+        early_bytes: Bytes a pixel at most before there is a pool, where that is known to be more than none.
         skips: What was not needed and is exact without it: words -> how often. See `renderer.techniques.skips`.
     """
 
@@ -54,12 +54,13 @@ class Rendered:
     captured: int
     pool_bytes: int
     pixel_bytes: int
+    early_bytes: int = 0
     skips: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def total_bytes(self) -> int:
-        """Pool and all per-pixel buffers."""
-        return self.pool_bytes + self.pixel_bytes * len(self.k)
+        """The peak of the frame: the pool and what lives beside it, or what was there before."""
+        return max(self.pool_bytes + self.pixel_bytes * len(self.k), self.early_bytes * len(self.k))
 
     @property
     def milliseconds(self) -> float:

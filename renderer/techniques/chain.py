@@ -113,11 +113,8 @@ def render_chain(
         passes={**frame.passes("opaque", *needed), **clock.passes},
         captured=int(k.sum(dtype=np.int64)),
         pool_bytes=SLOT_BYTES * total,
-        # There is no pool before.
-        pixel_bytes=max(
-            chain_bytes(gathered, None if complete else budget.tail) + beside,
-            before - SLOT_BYTES * total // frame.pixels,
-        ),
+        pixel_bytes=chain_bytes(gathered, None if complete else budget.tail) + beside,
+        early_bytes=before,
         skips={**frame_skips(frame), TAIL: int(complete)},
     )
 

@@ -182,7 +182,8 @@ class KBufferDeep:
             passes={**frame.passes("opaque", "count", "gather", *read), **clock.passes},
             captured=int(k.sum(dtype=np.int64)),
             pool_bytes=pool_bytes,
-            pixel_bytes=max(during, before - pool_bytes // frame.pixels),  # there is no pool before
+            pixel_bytes=during,
+            early_bytes=before,
             skips={**frame_skips(frame), **skips, UNREAD_SUMS: self._unread},
         )
 

@@ -9,7 +9,7 @@ from renderer.allocation.fill import budget_fill, feasible_k_min
 from renderer.allocation.importance import VkbOptions, vkb_importance
 from renderer.frame import Clock, Frame
 from renderer.techniques.base import Budget, Rendered
-from renderer.techniques.chain import render_chain, render_complete
+from renderer.techniques.chain import RANGE_BYTES, render_chain, render_complete
 from schemas.tail import DENSITY_BINS
 
 
@@ -40,6 +40,7 @@ class KBufferImportance:
             facing = read.astype(np.uint8)
             weights = vkb_importance(n, facing, frame.width, frame.height, self._options)
             slots = budget_fill(weights, n, budget.fragments, feasible_k_min(n, budget.fragments))
-        rendered = render_chain(frame, slots, n, budget, gathered)
+        before = RANGE_BYTES + gathered.pass_bytes
+        rendered = render_chain(frame, slots, n, budget, frame.retire(gathered), before)
         rendered.passes.update(clock.passes)
         return rendered

@@ -57,8 +57,6 @@ def planned(options: BenchOptions, bundle: Bundle | None) -> list[CellKey]:
                 CellKey(technique=name, basis=basis, budget_factor=factor, tail=tail, g=g, bundle=label)
                 for factor in options.budgets
                 for basis in bases
-                # At equal memory the fixed k-buffer gets what it has.
-                if (name, basis) != (FIXED, "memory")
             ]
     return cells
 
@@ -74,15 +72,18 @@ def steepness(tail: TailName, g: float) -> float | None:
     return g if tail.startswith("density") else None
 
 
-def fragments_within(total_bytes: int, pixels: int, pixel_bytes: int) -> int:
+def fragments_within(total_bytes: int, pixels: int, pixel_bytes: int, early_bytes: int = 0) -> int:
     """F that a total memory buys: `F(M) = floor((M - |P| S_p) / S_f)` (DHOIT, Eq. 1; all of S_i is in S_p).
 
     Args:
         total_bytes: M.
         pixels: |P|.
-        pixel_bytes: S_p, bytes a pixel of everything but the pool.
+        pixel_bytes: S_p, bytes a pixel of everything beside the pool.
+        early_bytes: Bytes a pixel before there is a pool; they have to fit as well, and may lie where it will be.
 
     Returns:
         Fragments; negative where the buffers of the pixels alone take more.
     """
+    if pixels * early_bytes > total_bytes:
+        return -1
     return (total_bytes - pixels * pixel_bytes) // SLOT_BYTES

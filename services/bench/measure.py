@@ -24,9 +24,10 @@ _UNREAD = 2.0
 
 @dataclass(slots=True)
 class _Bytes:
-    """Bytes a pixel, and of everything."""
+    """Bytes a pixel beside the pool and before it, and of everything."""
 
     pixel: int
+    early: int
     total: int
 
 
@@ -90,7 +91,7 @@ class Bench:
         if wrong:
             return BenchCell(**about, problem=f"{wrong:,} pixels of the picture are no numbers")
         self._runs.append(run)
-        self._bytes[key] = _Bytes(rendered.pixel_bytes, rendered.total_bytes)
+        self._bytes[key] = _Bytes(rendered.pixel_bytes, rendered.early_bytes, rendered.total_bytes)
         return BenchCell(**about, **self._facts(rendered), **self._judged(key, rendered, bool(about.get("exact"))))
 
     def _fragments(self, key: CellKey) -> int:
@@ -101,13 +102,13 @@ class Bench:
             return given
         fixed = self._bytes_of(key.model_copy(update={"technique": FIXED, "basis": "fragments", "bundle": None}))
         own = self._bytes_of(key.model_copy(update={"basis": "fragments"}))
-        return fragments_within(fixed.total, self.subject.pixels, own.pixel)
+        return fragments_within(fixed.total, self.subject.pixels, own.pixel, own.early)
 
     def _bytes_of(self, key: CellKey) -> _Bytes:
         """Bytes of a cell at equal F, from its picture, or from one that is made for this."""
         if key not in self._bytes:
             rendered = self._run(key, self._fragments(key)).first(self.subject, self.options.limit)
-            self._bytes[key] = _Bytes(rendered.pixel_bytes, rendered.total_bytes)
+            self._bytes[key] = _Bytes(rendered.pixel_bytes, rendered.early_bytes, rendered.total_bytes)
         return self._bytes[key]
 
     def _run(self, key: CellKey, fragments: int) -> Run:
@@ -129,6 +130,7 @@ class Bench:
             "captured_fragments": rendered.captured,
             "pool_bytes": rendered.pool_bytes,
             "pixel_bytes": rendered.pixel_bytes,
+            "early_bytes": rendered.early_bytes,
             "total_bytes": rendered.total_bytes,
             "skips": {what: int(count) for what, count in rendered.skips.items() if count},
         }

@@ -144,8 +144,8 @@ def _show(picture: Picture) -> None:
         print(f"  budget {picture.budget:,} fragments, {picture.tail} tail")
     total = sum(picture.passes.values())
     print(f"  {total:.1f} ms: {', '.join(f'{name} {ms:.1f}' for name, ms in picture.passes.items())}")
-    memory = f"pool {size(picture.pool_bytes or 0)}, {picture.pixel_bytes} bytes a pixel"
-    print(f"  memory: {memory}, together {size(picture.total_bytes or 0)}")
+    memory = f"pool {size(picture.pool_bytes or 0)}, {picture.pixel_bytes} bytes a pixel beside it"
+    print(f"  memory: {memory}, {size(picture.total_bytes or 0)} at most")
     if picture.skips:
         print(f"  skipped: {', '.join(f'{count:,} {what}' for what, count in picture.skips.items())}")
     if picture.mse is not None:

@@ -121,17 +121,24 @@ def test_equal_memory_is_that_of_the_fixed_k_buffer(
     measured: tuple[list[Yardstick], dict[CellKey, BenchCell]],
 ) -> None:
     cells = measured[1]
+    seen: set[tuple[str, bool]] = set()
     for key, cell in cells.items():
         if key.basis == "memory":
             fixed = cells[key.model_copy(update={"technique": "kbuffer", "basis": "fragments"})]
             own = cells[key.model_copy(update={"basis": "fragments"})]
-            assert (cell.total_bytes or 0) <= (fixed.total_bytes or 0)
-            spare = (own.pixel_bytes or 0) - (fixed.pixel_bytes or 0)
-            room = (fixed.pool_bytes or 0) // 8 - spare * SIZE[0] * SIZE[1] // 8
-            assert cell.budget == max(0, room)
+            pixels, given = SIZE[0] * SIZE[1], fixed.total_bytes or 0
+            assert (cell.total_bytes or 0) <= given
+            room = (given - (own.pixel_bytes or 0) * pixels) // 8
+            fits = own.early_bytes * pixels <= given
+            assert cell.budget == (max(0, room) if fits else 0)
+            seen.add((key.technique, fits))
+    assert ("kbuffer", True) in seen
 
 
-def test_where_the_buffers_of_the_pixels_leave_nothing_it_says_so(subject: Subject) -> None:
+def test_where_the_buffers_of_the_pixels_leave_nothing_it_says_so(
+    subject: Subject, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("renderer.techniques.kbuffer_importance.RANGE_BYTES", 12 + 60)
     options = BenchOptions((), ("kbuffer-importance",), Path("unused"), budgets=(0.5,))
     _, cells = Bench(subject, options, None).measure(planned(options, None))
     assert cells[0].problem is None

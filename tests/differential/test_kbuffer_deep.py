@@ -206,9 +206,10 @@ def test_features_are_given_back_before_fragments_are_captured(
     # the first sums and the tail's targets, with the pool.
     before, after = 12 + 8 + max(gathered, 16 + 4), 12 + 4 + 16 + 32
     few = deep.render(fresh, Budget(dump.total // 10, "density"))
-    assert few.pixel_bytes == max(before - few.pool_bytes // fresh.pixels, after)
+    assert (few.early_bytes, few.pixel_bytes) == (before, after)
+    assert few.total_bytes == max(before * fresh.pixels, after * fresh.pixels + few.pool_bytes)
     many = deep.render(fresh, Budget(dump.total - 1, "density"))
-    assert many.pixel_bytes == max(before - many.pool_bytes // fresh.pixels, after) < before
+    assert many.total_bytes == max(before * fresh.pixels, after * fresh.pixels + many.pool_bytes)
 
 
 def test_onnx_and_glsl_give_the_same_picture(deep: KBufferDeep, bundle: Path, frame: Frame, dump: FragmentDump) -> None:

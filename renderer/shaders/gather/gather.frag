@@ -1,7 +1,7 @@
 #version 450
 // Order-independent sums over all fragments of a pixel, by additive blending (renderer/features.py: SUMS).
-// SUMS0 to SUMS4 are the colour attachments of the sums that are wanted; others are not defined. With BINS, BIN0 is that
-// of the optical depth, and those that follow are the depth bins'.
+// SUMS0 to SUMS4 are the colour attachments of the sums that are wanted; others are not defined. With BINS there are none:
+// the first is that of the optical depth, and those that follow are the depth bins'.
 layout(early_fragment_tests) in;
 #include "common/surface.glsl"
 
@@ -22,8 +22,8 @@ uniform int width;
 
 #if BINS
 #include "common/depth_bins.glsl"
-layout(location = BIN0) out float binned_depth;       // sum -ln(1-a)
-layout(location = BIN0 + 1) out vec4 bins[BINS / 4];  // the same by bin, in whole units / BIN_LIMIT
+layout(location = 0) out float binned_depth;   // sum -ln(1-a)
+layout(location = 1) out vec4 bins[BINS / 4];  // the same by bin, in whole units / BIN_LIMIT
 #endif
 #ifdef SUMS0
 layout(location = SUMS0) out vec4 sums0;  // n, sum a, sum a^2, sum -ln(1-a)

@@ -141,7 +141,8 @@ def test_costs_count_what_is_gathered() -> None:
     assert full.feature_bytes == 8 + 5 * 8 + 4
     assert full.capture_bytes == lean.capture_bytes
     assert rule_cost("density", nearest=False).capture_bytes == 64
-    assert rule_cost("density-8", nearest=True).gather_bytes == rule_cost("density-8", nearest=False).gather_bytes + 8
+    assert rule_cost("density", nearest=True).gather_bytes == rule_cost("density", nearest=False).gather_bytes + 8
+    assert rule_cost("density-8", nearest=True).gather_bytes == 12 + 8 + 2 * 8 + 4, "the nearest comes after the bins"
 
 
 @given(
