@@ -16,7 +16,7 @@ from services.bench.cells import FIXED, Bundle, fragments_within
 from services.bench.flicker import measure_flicker
 from services.bench.options import BenchOptions
 from services.bench.rounds import Run, in_turns
-from services.bench.subject import ORACLE_TAIL, Subject
+from services.bench.subject import ORACLE_TAIL, Errors, Subject
 
 _UNREAD = 2.0
 """Budget as a multiple of the pixels, for techniques that read none."""
@@ -47,6 +47,7 @@ class Bench:
     _cells: dict[CellKey, BenchCell] = field(default_factory=dict)
     _runs: list[Run] = field(default_factory=list)
     _bytes: dict[CellKey, _Bytes] = field(default_factory=dict)
+    _seen: dict[tuple[Any, ...], tuple[dict[str, Any], Errors]] = field(default_factory=dict)
     _marks: dict[tuple[str, TailName, float | None, float], Yardstick] = field(default_factory=dict)
 
     def measure(self, keys: Sequence[CellKey]) -> tuple[list[Yardstick], list[BenchCell]]:
@@ -80,6 +81,11 @@ class Bench:
             about |= {"budget": max(fragments, 0), "exact": fragments >= self.subject.dump.total}
         if fragments < 1:
             return BenchCell(**about, problem="the buffers of the pixels alone take more than this memory")
+        # Another memory may hold the same number of fragments.
+        same = key.technique, key.tail, key.g, fragments
+        if key.basis == "memory" and same in self._seen:
+            facts, errors = self._seen[same]
+            return BenchCell(**about, **facts, **self._judged(key, errors, bool(about.get("exact"))))
         run = self._run(key, fragments)
         try:
             rendered = run.first(self.subject, self.options.limit)
@@ -92,7 +98,8 @@ class Bench:
             return BenchCell(**about, problem=f"{wrong:,} pixels of the picture are no numbers")
         self._runs.append(run)
         self._bytes[key] = _Bytes(rendered.pixel_bytes, rendered.early_bytes, rendered.total_bytes)
-        return BenchCell(**about, **self._facts(rendered), **self._judged(key, rendered, bool(about.get("exact"))))
+        facts, errors = self._seen[same] = self._facts(rendered), self.subject.errors(rendered)
+        return BenchCell(**about, **facts, **self._judged(key, errors, bool(about.get("exact"))))
 
     def _fragments(self, key: CellKey) -> int:
         """F of a cell; less than 1 where there is no room for any."""
@@ -135,9 +142,8 @@ class Bench:
             "skips": {what: int(count) for what, count in rendered.skips.items() if count},
         }
 
-    def _judged(self, key: CellKey, rendered: Rendered, is_exact: bool) -> dict[str, Any]:
+    def _judged(self, key: CellKey, errors: Errors, is_exact: bool) -> dict[str, Any]:
         """Errors, and what they are over those of the yardsticks where something had to be decided."""
-        errors = self.subject.errors(rendered)
         judged: dict[str, Any] = asdict(errors)
         if key.budget_factor is None or key.tail is None or is_exact:
             return judged

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -133,6 +134,31 @@ def test_equal_memory_is_that_of_the_fixed_k_buffer(
             assert cell.budget == (max(0, room) if fits else 0)
             seen.add((key.technique, fits))
     assert ("kbuffer", True) in seen
+
+
+def test_where_another_memory_holds_the_same_fragments_nothing_is_rendered_again(
+    subject: Subject, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, pictured = Run.first, []
+
+    def counted(run: Run, *given: Any) -> Rendered:
+        pictured.append(run.budget.fragments)
+        return first(run, *given)
+
+    monkeypatch.setattr(Run, "first", counted)
+    options = BenchOptions((), ("kbuffer",), Path("unused"), budgets=(4.0, 5.0))
+    _, cells = Bench(subject, options, None).measure(planned(options, None))
+    assert len(pictured) == 2
+    for factor in (4.0, 5.0):
+        fragments, memory = sorted(
+            (cell for cell in cells if cell.budget_factor == factor), key=lambda cell: cell.basis == "memory"
+        )
+        assert memory.budget == fragments.budget
+        assert (memory.mse, memory.score, memory.total_bytes) == (
+            fragments.mse,
+            fragments.score,
+            fragments.total_bytes,
+        )
 
 
 def test_where_the_buffers_of_the_pixels_leave_nothing_it_says_so(
