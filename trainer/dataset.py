@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final, TypeVar
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,9 +15,7 @@ from labeller.dataset import read_ahead
 from labeller.shard_file import BLOCK_ROWS
 from labeller.shards import Shard, read_shard
 from schemas.problem import ExitCode, Problem
-
-SEGMENTS: Final = 24
-"""Hull segments per pixel; longer hulls are simplified to this many."""
+from trainer.segments import SEGMENTS, hull_segments, pad_segments
 
 GROUP: Final = 128
 """Rows of a batch that share a view and a price."""
@@ -260,7 +257,7 @@ def make_view(
         anchors: log lambda at the budgets that are scored.
         sampled_pixels: Pixels of the image that the rows stand for.
     """
-    offsets, slopes, lengths = _segments(*hull)
+    offsets, slopes, lengths = hull_segments(*hull)
     lossless = lossless_error(sampled_pixels)
     order = np.argsort(slopes, kind="stable")
     below = np.concatenate([[0.0], np.cumsum((slopes * lengths).astype(np.float64)[order])])
@@ -325,7 +322,7 @@ def sample_batch(
             noise = np.random.default_rng((*seed, g)).standard_normal((GROUP, len(columns)), dtype=np.float32)
             features[part] += how.noise * noise
         n[part], k_min[part], log_lambda[part] = view.n[rows], view.k_min, price
-        _pad(view.offsets, view.slopes, view.lengths, rows, slopes[part], lengths[part])
+        pad_segments(view.offsets, view.slopes, view.lengths, rows, slopes[part], lengths[part])
         scale[own] = np.exp(np.interp(price, view.price_grid, np.log(view.scale_grid)))
     return Batch(features, n, k_min, slopes, lengths, log_lambda, scale, groups / total)
 
@@ -393,55 +390,3 @@ def _draw_price(view: ViewData, rng: np.random.Generator) -> float:
         anchor = max(float(rng.choice(view.anchors)), view.price_range[0])
         return anchor + float(rng.normal(0.0, ANCHOR_SPREAD))
     return float(rng.uniform(*view.price_range))
-
-
-@numba.njit(cache=True)
-def _pad(
-    offsets: NDArray[np.int64],
-    slopes: NDArray[np.float32],
-    lengths: NDArray[np.float32],
-    rows: NDArray[np.int64],
-    out_slopes: NDArray[np.float32],
-    out_lengths: NDArray[np.float32],
-) -> None:
-    for i in range(len(rows)):
-        first = offsets[rows[i]]
-        for j in range(offsets[rows[i] + 1] - first):
-            out_slopes[i, j] = slopes[first + j]
-            out_lengths[i, j] = lengths[first + j]
-
-
-@numba.njit(cache=True, nogil=True)
-def _segments(
-    hull_offsets: NDArray[np.int64], hull_k: NDArray[np.int32], hull_error: NDArray[np.float32]
-) -> tuple[NDArray[np.int64], NDArray[np.float32], NDArray[np.float32]]:
-    """CSR segments (slope, length) of hulls given by their vertices, at most SEGMENTS each.
-
-    Leaving out a vertex replaces two segments by their chord: the hull stays convex and never lies below the
-    true one. The vertex whose removal adds the least area goes first.
-    """
-    rows = len(hull_offsets) - 1
-    offsets = np.zeros(rows + 1, dtype=np.int64)
-    slopes = np.empty(len(hull_k), dtype=np.float32)
-    lengths = np.empty(len(hull_k), dtype=np.float32)
-    used = 0
-    for r in range(rows):
-        k = hull_k[hull_offsets[r] : hull_offsets[r + 1]].astype(np.float64)
-        e = hull_error[hull_offsets[r] : hull_offsets[r + 1]].astype(np.float64)
-        count = len(k)
-        while count > SEGMENTS + 1:
-            best, least = 1, np.inf
-            for j in range(1, count - 1):
-                chord = (k[j] - k[j - 1]) * (e[j + 1] - e[j - 1]) - (e[j] - e[j - 1]) * (k[j + 1] - k[j - 1])
-                if chord < least:
-                    best, least = j, chord
-            k[best : count - 1] = k[best + 1 : count].copy()
-            e[best : count - 1] = e[best + 1 : count].copy()
-            count -= 1
-        for j in range(count - 1):
-            slopes[used] = (e[j] - e[j + 1]) / (k[j + 1] - k[j])
-            lengths[used] = k[j + 1] - k[j]
-            if slopes[used] > 0.0:
-                used += 1
-        offsets[r + 1] = used
-    return offsets, slopes[:used].copy(), lengths[:used].copy()

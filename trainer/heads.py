@@ -18,7 +18,7 @@ from trainer.dataset import Batch, Drawing, ViewData, normalisation, sample_batc
 from trainer.evaluate import BudgetScore, evaluate
 from trainer.loss import lagrangian_regret
 from trainer.models import Network
-from trainer.paper import LABEL_PEAK, PAPER_FEATURES, Fill, paper_batch, paper_inputs
+from trainer.paper import LABEL_PEAK, PAPER_FEATURES, Fill, paper_batch, paper_inputs, unscored
 from trainer.sgd import Optimiser, Sgd
 from trainer.views import View
 from trainer.weights import Weights
@@ -115,7 +115,10 @@ class PaperHead:
         if self.is_repaired:
             # The rows of a view are in memory while it is its turn.
             seen = [_paper_moments(view.subset(config.validation_rows, config.seed)) for view in views]
-            mean, std = normalisation([view.asset for view in views], seen)
+            scored = [(view.asset, found) for view, found in zip(views, seen, strict=True) if found is not None]
+            if not scored:
+                raise unscored()
+            mean, std = normalisation([asset for asset, _ in scored], [found for _, found in scored])
             # The shares of one pixel are near 1e-6: whatever spreads at all is read.
             std = np.where(std > 0.0, std, np.float32(1.0)).astype(np.float32)
         torch.manual_seed(config.seed)
@@ -180,8 +183,13 @@ def batch_loss(network: Network, batch: Batch, config: TrainConfig) -> Tensor:
     return (1.0 - config.view_weight) * rows + config.view_weight * views + config.leak * leak
 
 
-def _paper_moments(view: ViewData) -> tuple[np.ndarray, np.ndarray]:
-    """Means of the inputs and of their squares, over the budgets that the view is scored at."""
+def _paper_moments(view: ViewData) -> tuple[np.ndarray, np.ndarray] | None:
+    """Means of the inputs and of their squares, over the budgets that the view is scored at; None without any.
+
+    A budget has no price where less than it suffices: such a view has no labels, and no row of it is drawn.
+    """
     budgets = view.paper.budgets if view.paper is not None else (0,)
+    if not budgets:
+        return None
     inputs = np.concatenate([paper_inputs(view, slice(None), budget) for budget in budgets])
     return inputs.mean(axis=0, dtype=np.float64), np.square(inputs, dtype=np.float64).mean(axis=0)

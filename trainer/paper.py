@@ -103,7 +103,7 @@ def paper_batch(
     """
     scored = [view for view in views if len(view.anchors)]
     if not scored:
-        raise Problem("No view is scored at a budget, so there are no labels K / F.", "Label views at some budgets.")
+        raise unscored()
     total = max(1, size // GROUP)
     inputs, counts, budgets = [], [], []
     for g, view, rng in draw_views(scored, seed, total, replace(drawing, replay=(), hardness=())):
@@ -116,6 +116,11 @@ def paper_batch(
             counts.append(_optimal_counts(view.offsets, view.slopes, view.lengths, view.k_min, price, rows))
             budgets.append(np.tile(np.array([[about.budgets[level], about.pixels]], np.float32), (GROUP, 1)))
     return np.concatenate(inputs), np.concatenate(counts), np.concatenate(budgets), len(inputs) / total
+
+
+def unscored() -> Problem:
+    """What is wrong where no view has a price at a scored budget."""
+    return Problem("No view is scored at a budget, so there are no labels K / F.", "Label views at some budgets.")
 
 
 def importance_counts(weights: Weights, view: ViewData, level: int, budget: int, fill: Fill) -> NDArray[np.int32]:

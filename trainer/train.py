@@ -77,6 +77,7 @@ def train(
     replay: Sequence[View] = (),
     log: Path | None = None,
     team: Team | None = None,
+    head: Head | None = None,
 ) -> TrainResult:
     """Train a network.
 
@@ -93,6 +94,8 @@ def train(
         replay: Views of an earlier data set, mixed in so that what `start` knows of them is not forgotten.
         log: File of JSON lines (`trainer.log`) that is written meanwhile.
         team: The processes that train together; None: this one alone.
+        head: Network, loss and score; None: those of the preset. A checkpoint does not know it: use another file for
+            another head.
 
     Returns:
         The best state. The same for the same data, configuration and number of threads, interrupted or not.
@@ -112,7 +115,7 @@ def train(
         held_out = [view for view in (*views, *replay) if view.asset in kept_out]
         views, replay = ([view for view in given if view.asset not in kept_out] for given in (views, replay))
     with _deterministic(config.threads):
-        run = _Run(views, held_out, replay, config, start, checkpoint, team or Alone())
+        run = _Run(views, held_out, replay, config, start, checkpoint, team or Alone(), head or HEADS[config.preset])
         lines = TrainLog(log if run.team.rank == 0 else None, run.state.step, config.batch)
         while run.state.step < config.steps and not run.state.is_stale(config.patience):
             loss, lr = run.advance()
@@ -157,9 +160,10 @@ class _Run:
         start: Weights | None,
         checkpoint: Path | None,
         team: Team,
+        head: Head,
     ) -> None:
         self.config, self.team, self._checkpoint = config, team, checkpoint
-        self.head: Head = HEADS[config.preset]
+        self.head = head
         self.network = self.head.network(views, config) if start is None else Network.from_weights(start)
         self.optimiser: Optimiser = self.head.optimiser(self.network)
         room = config.pool_rows // (2 if replay else 1)
@@ -168,6 +172,11 @@ class _Run:
         rows = min(config.validation_rows, max(LEAST_VALIDATION_ROWS, config.pool_rows // len(judges)))
         # The first process validates for all.
         self._validation = [view.subset(rows, config.seed) for view in judges] if team.rank == 0 else []
+        if config.preset != "gain-curve" and self._validation and not any(len(x.anchors) for x in self._validation):
+            raise Problem(
+                "No validation view is scored at a budget, so nothing tells which state is best.",
+                "Hold out a view of more fragments than its budgets.",
+            )
         self._mined = [view.subset(MINING_ROWS, config.seed) for view in views] if config.mining else []
         began = config.decisive + ("" if start is None else start.digest())
         self._key = data_key(began, [*views, *held_out, *replay])

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Set
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any, Final
 
 from renderer.features import FEATURES, texels_of
-from renderer.frame import NEAREST, Gathered
+from renderer.frame import NEAREST, Gathered, front_bytes
 from renderer.techniques.chain import RANGE_BYTES, SLOT_BYTES, chain_bytes
 from renderer.techniques.kbuffer_deep import before_bytes
 from schemas.tail import DENSITY_BINS, TailName
@@ -52,18 +53,19 @@ def memory_of(multiple: int, pixels: int) -> int:
     return (SLOT_BYTES * multiple + FIXED_BYTES) * pixels
 
 
-def network_cost(weights: Weights, tail: TailName) -> Cost:
+def network_cost(weights: Weights, tail: TailName, block: int = 1) -> Cost:
     """Of `kbuffer-deep` with a network.
 
     Args:
         weights: The network; features that are not in `renderer.features.FEATURES` cost nothing to gather: n and
             depths are there anyway.
         tail: That the frame uses.
+        block: Pixels across a block that has one pixel's sums (`benchmarks.predicting.inputs.stand_ins`).
     """
     bins = DENSITY_BINS.get(tail, 0)
     names = [name for name in weights.features if name in FEATURES]
     read = texels_of(names, binned=bool(bins)) | (frozenset() if bins else {0})
-    gathered = _gathered(read, bins)
+    gathered = _gathered(read, bins, block=block)
     return Cost(
         weights=sum(weight.size + bias.size for weight, bias in weights.layers),
         multiply_adds=sum(weight.size for weight, _ in weights.layers),
@@ -100,9 +102,22 @@ def _tail_sums(tail: TailName, others: frozenset[int]) -> Gathered:
     return _gathered(own | others, DENSITY_BINS.get(tail, 0), is_facing=NEAREST in others)
 
 
-def _gathered(texels: Set[int], bins: int, is_facing: bool = False) -> Gathered:
+@dataclass
+class _Coarse(Gathered):
+    """A gather pass of whose sums and nearest fragments there is one for a block of pixels; bins have every pixel."""
+
+    block: int = 1
+
+    @property
+    def pixel_bytes(self) -> int:
+        """Bytes a pixel of all this, rounded up."""
+        kept = front_bytes(self.bins)
+        return kept + math.ceil((super().pixel_bytes - kept) / self.block**2)
+
+
+def _gathered(texels: Set[int], bins: int, is_facing: bool = False, block: int = 1) -> Gathered:
     """What a gather pass of these texels leaves, as far as its size goes: nothing of it is on a GPU."""
     stand_in: Any = SimpleNamespace
     sums = [stand_in(glo=texel, dtype="f2" if bins else "f4") for texel in texels if texel < NEAREST]
     nearest = stand_in() if NEAREST in texels else None
-    return Gathered("gather", sums, nearest, stand_in() if is_facing else None, bins=bins)
+    return _Coarse("gather", sums, nearest, stand_in() if is_facing else None, bins=bins, block=block)

@@ -1,41 +1,40 @@
-"""Trials on what a network is given to read, and on more to train on. Nothing of this is in the product.
+"""Trials on what a network is given to read. Nothing of this is in the product.
 
-`density-8` leaves every other column of the 16 bins' shares empty: inputs that are tried take the place of two of
+`density-8` leaves every other column of the 16 bins' shares empty: inputs that are added take the place of two of
 those, so that the product's own training reads them.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Final, Literal, get_args
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.features import FEATURES
-from schemas.fragments import FragmentDump
+from renderer.features import FEATURES, texels_of
+from renderer.frame import NEAREST
 
-Inputs = Literal["plain", "neighbourhood", "view-means", "view-normalised"]
+Inputs = Literal["plain", "neighbourhood", "view-means", "view-normalised", "half-resolution", "quarter-resolution"]
 """`neighbourhood`: also the mean of log n and of the optical depth over the 3x3 pixels; `view-means`: over the view;
-`view-normalised`: every feature relative to mean and spread in its view."""
+`view-normalised`: every feature relative to mean and spread in its view; `half-resolution`, `quarter-resolution`: sums
+and nearest fragment are those of one pixel in each block of 2x2 or 4x4 (`stand_ins`)."""
 
-Remap = Literal["0.15", "0.6", "by colour"]
-"""What every opacity of a view is replaced with."""
-
-REMAPS: Final[tuple[Remap, ...]] = get_args(Remap)
+BLOCKS: Final[dict[Inputs, int]] = {"half-resolution": 2, "quarter-resolution": 4}
+"""Pixels across a block that has one pixel's sums."""
 
 _SPARE: Final = [FEATURES.index(name) for name in ("front_1", "front_3")]
 _AVERAGED: Final = [FEATURES.index(name) for name in ("log_n", "optical_depth")]
-_COARSE: Final = 32
-"""Colours this far apart, of 256, may be different materials."""
-_ALPHAS: Final = np.array([0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8])
+_GATHERED: Final = [i for i, name in enumerate(FEATURES) if texels_of([name], binned=True) & set(range(NEAREST + 1))]
+"""Those that read what only a gather pass has. Number and depths of the fragments, the depth bins, with them the
+optical depth, and the background are there for every pixel."""
 
 
 def changed(features: NDArray[np.float32], inputs: Inputs, width: int) -> NDArray[np.float32]:
     """Features of all pixels of a view as a trial wants them.
 
     Args:
-        features: float32 [P, C], columns `FEATURES`; without fragments zero. With two columns to spare: `density-8`.
+        features: float32 [P, C], columns `FEATURES`; without fragments zero. For `neighbourhood` and `view-means` with
+            two columns to spare: `density-8`. For lower resolutions with depth bins: they know every optical depth.
         inputs: What is tried.
         width: Pixels per row.
     """
@@ -48,21 +47,36 @@ def changed(features: NDArray[np.float32], inputs: Inputs, width: int) -> NDArra
         out = (features - mean) / np.where(std > 1e-4, std, np.float32(1.0))
     elif inputs == "view-means":
         out[:, _SPARE] = features[seen][:, _AVERAGED].mean(axis=0)
+    elif inputs in BLOCKS:
+        occupied = features[:, FEATURES.index("optical_depth")] > 0.0
+        out[:, _GATHERED] = features[stand_ins(occupied, width, BLOCKS[inputs])][:, _GATHERED]
+        out[~occupied] = 0.0
     else:
         out[:, _SPARE] = _around(features[:, _AVERAGED].reshape(-1, width, 2)).reshape(-1, 2)
     return np.asarray(out, dtype=np.float32)
 
 
-def remapped(dump: FragmentDump, remap: Remap) -> FragmentDump:
-    """The same fragments with other opacities."""
-    rgba = dump.rgba.copy()
-    if remap == "by colour":
-        cell = (dump.rgba[:, :3] // _COARSE).astype(np.uint32) @ np.array([1, 8, 64], dtype=np.uint32)
-        mixed = (cell * np.uint32(2654435761)) >> np.uint32(16)  # Knuth's multiplicative hash
-        rgba[:, 3] = np.round(255.0 * _ALPHAS[mixed % len(_ALPHAS)])
-    else:
-        rgba[:, 3] = round(255.0 * float(remap))
-    return replace(dump, rgba=rgba)
+def stand_ins(occupied: NDArray[np.bool_], width: int, block: int) -> NDArray[np.int64]:
+    """For every pixel the one of its block whose sums it reads, int64 [P].
+
+    It is the one whose centre is nearest to that of the block, the first of equals, if it has a fragment; else the
+    nearest that has one. What a renderer would do: draw the gather pass at `1 / block` of the size, the projection
+    moved so that samples fall on those first centres, and give every pixel the sums of its block. It would have none
+    of a block that is occupied elsewhere only: there the trial is better off, by what a second draw would cost.
+
+    Args:
+        occupied: bool [P], pixels with fragments.
+        width: Pixels per row.
+        block: Pixels across a block; those at the right and lower edges may be smaller.
+    """
+    place = np.arange(len(occupied))
+    y, x = np.divmod(place, width)
+    middle = 0.5 * (block - 1)
+    away = np.square(y % block - middle) + np.square(x % block - middle)
+    blocks = (y // block) * -(-width // block) + x // block
+    order = np.lexsort((place, away, ~occupied, blocks))
+    first = order[np.unique(blocks[order], return_index=True)[1]]
+    return np.asarray(first[blocks], dtype=np.int64)
 
 
 def _around(values: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.predicting.augmentation import Remap, remapped
 from benchmarks.predicting.cost import Cost, memory_of, rule_cost
-from benchmarks.predicting.inputs import Remap, remapped
 from benchmarks.predicting.store import Store, key_of
 from benchmarks.predicting.views import ViewRow, load_dump
 from labeller.allocation import RuleName
@@ -66,7 +66,7 @@ def labels_of(store: Store, row: ViewRow, tail: TailName, remap: Remap | None = 
         store: Where they are kept.
         row: The view.
         tail: The tail.
-        remap: What its opacities are replaced with; None: nothing. Such a view is trained on and never scored.
+        remap: What is changed in it; None: nothing. Such a view is trained on and never scored.
     """
     key = key_of(row.digest, tail, remap, store.code("labels"))
     shard, errors = (store.path("labels", f"{key}.{suffix}") for suffix in ("safetensors", "npy"))

@@ -51,16 +51,27 @@ _TITLES: Final = {
     "seeds": "Seeds",
     "labels": "Labels of another tail than the deployed one",
     "presets": "Presets",
-    "augmentation": "More opacities to train on",
-    "inputs": "Neighbourhoods, views and feedback",
+    "augmentation": "More to train on",
+    "inputs": "Neighbourhoods, views, resolution and feedback",
 }
 
 _NOTES: Final = {
     "labels": "Rows with the labels of `density` have no depth bins either: compare with the network that reads none.",
+    "losses": (
+        "`distilled`: a `small` network learns the gains that the `full` one of the same fold answers where that stops "
+        "at the drawn prices, alone or half and half with the regret."
+    ),
+    "augmentation": (
+        "Beside the views themselves: views of opacity .33 with three other opacities; every view with R, G and B of "
+        "each pixel in another order (labels stay as they are); views of opacity .33 from which one half of the coarse "
+        "colours is gone, or the other half."
+    ),
     "presets": "DHOIT's network as printed (`paper`: Eq. 3, floor only) and with its labels' scale and fill repaired.",
     "inputs": (
         "Trials in the benchmark only. `neighbourhood`: also 3x3 means of log n and optical depth; `view-means`: means "
-        "over the view; `view-normalised`: features relative to their view. Feedback: after a frame, every pixel's "
+        "over the view; `view-normalised`: features relative to their view. `half-resolution`, `quarter-resolution`: "
+        "sums and nearest fragment are gathered for one pixel in each block of 2x2 or 4x4; n, depth range, optical "
+        "depth and bins are every pixel's own. Feedback: after a frame, every pixel's "
         "curve is moved half the way to what its last core fragment gained, once or twice, and the frame is solved "
         "again. `error`: the gain itself, which nobody knows in a frame; `colour`: how much the pixel's colour changed."
     ),

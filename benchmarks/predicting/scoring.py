@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from benchmarks.predicting.cost import Cost, gather_costs, memory_of, network_cost, rule_cost
 from benchmarks.predicting.feedback import corrected, observed
-from benchmarks.predicting.inputs import changed
+from benchmarks.predicting.inputs import BLOCKS, changed
 from benchmarks.predicting.labels import labels_of, oracle_of
 from benchmarks.predicting.store import Store, key_of
 from benchmarks.predicting.training import Trainings
@@ -66,7 +66,7 @@ def score_key(trainings: Trainings, variant: Variant, fold: int) -> str:
 
 def _score_fold(trainings: Trainings, variant: Variant, fold: int) -> list[Row]:
     weights = trainings.network(variant, fold)
-    cost = network_cost(weights, variant.tail)
+    cost = network_cost(weights, variant.tail, BLOCKS.get(variant.inputs, 1))
     unseen = [row for row in trainings.rows if not trainings.sees(row, fold)]
     return [_score_view(trainings.store, row, variant, weights, cost) for row in unseen]
 

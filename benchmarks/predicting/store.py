@@ -33,13 +33,13 @@ CODE: Final = {
         *(f"renderer.{name}" for name in ("features", "depth_bins")),
         *(f"renderer.allocation.{name}" for name in ("dynamic", "fill", "importance")),
         *("schemas.tail", "schemas.colour"),
-        *_here("labels", "inputs"),
+        *_here("labels", "augmentation"),
     ),
     # Settings of a training are in its key themselves.
     "training": (
         *(f"trainer.{name}" for name in ("adam", "dataset", "evaluate", "heads", "loss", "models")),
-        *(f"trainer.{name}" for name in ("paper", "sgd", "train", "views", "weights")),
-        *_here("training", "inputs"),
+        *(f"trainer.{name}" for name in ("paper", "segments", "sgd", "train", "views", "weights")),
+        *_here("training", "inputs", "augmentation", "distilled"),
     ),
     "scores": (
         *("trainer.weights", "trainer.paper", "renderer.allocation.fill"),

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.predicting.cost import Cost, network_cost, rule_cost
+from benchmarks.predicting.inputs import BLOCKS
 from benchmarks.predicting.labels import OFFLINE, RUN_TIME, at_memory, labels_of, oracle_of
 from benchmarks.predicting.scoring import Row, ratio, scores_of
 from benchmarks.predicting.store import Store
@@ -53,13 +54,14 @@ def score(q: Sequence[float | None]) -> float:
 def variant_summary(trainings: Trainings, variant: Variant) -> dict[str, Any]:
     """Scores and cost of a variant; it is trained and scored where that has not been done."""
     rows = scores_of(trainings, variant)
-    cost = network_cost(trainings.network(variant, trainings.folds[0]), variant.tail)
+    weights = trainings.network(variant, trainings.folds[0])
+    cost = network_cost(weights, variant.tail, BLOCKS.get(variant.inputs, 1))
     assets = sorted({row["asset"] for row in rows})
     return {
         "part": variant.part,
         "tail": variant.tail,
         "base": variant.base,
-        "is_product": not (variant.is_augmented or variant.feedback or variant.labels)
+        "is_product": not (variant.augmentation or variant.teacher or variant.feedback or variant.labels)
         and (variant.inputs, variant.config.preset) == ("plain", "gain-curve"),
         "cost": asdict(cost),
         "q": by_multiple(rows, "q"),

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.predicting.inputs import REMAPS, Remap, changed
+from benchmarks.predicting.augmentation import REMAPS, Remap, recoloured
+from benchmarks.predicting.distilled import DistilledHead
+from benchmarks.predicting.inputs import changed
 from benchmarks.predicting.labels import labels_of
 from benchmarks.predicting.store import Store, key_of
-from benchmarks.predicting.variants import Variant
+from benchmarks.predicting.variants import Variant, variants
 from benchmarks.predicting.views import ViewRow, load_dump
 from labeller.shards import read_shard
 from renderer.features import derive, gather
@@ -25,7 +27,7 @@ Named = list[tuple[str, ViewData]]
 """Views with their assets."""
 
 _REMAPPED_MODE = "alpha .33"
-"""Views of this mode are those whose opacities are replaced: in the other one the same fragments come again."""
+"""Views of this mode are those that are remapped: in the other one the same fragments come again."""
 
 
 def folds_of(assets: Sequence[str], folds: int) -> dict[str, int]:
@@ -59,7 +61,9 @@ class Trainings:
             (row.asset, labels_of(self.store, row, variant.taught).key) for row in self.rows if self.sees(row, fold)
         ]
         outputs = {name: list(activation) for name, activation in ACTIVATIONS.items()}
-        about = (variant.config.decisive, variant.inputs, variant.is_augmented, outputs, FEATURE_LIMIT)
+        teacher = self._teacher(variant)
+        taught = self.key(teacher, fold) if teacher else None, variant.teaching
+        about = (variant.config.decisive, variant.inputs, variant.augmentation, taught, outputs, FEATURE_LIMIT)
         return key_of(*about, seen, self.store.code("training"))
 
     def sees(self, row: ViewRow, fold: int) -> bool:
@@ -70,12 +74,18 @@ class Trainings:
         """The network that has not seen a fold's assets; trained where it is not there."""
         path = self.store.path("networks", f"{self.key(variant, fold)}.safetensors")
         if not path.exists():
+            teacher = self._teacher(variant)
+            head = DistilledHead(self.network(teacher, fold), variant.teaching) if teacher else None
             views = [view for asset, view in self._views(variant) if self.fold[asset] != fold]
             # Held-out assets have no say in anything, so none are given.
-            weights = train(views, (), variant.config, checkpoint=self._checkpoint(path)).weights
+            weights = train(views, (), variant.config, checkpoint=self._checkpoint(path), head=head).weights
             self.store.write(path, lambda part: save_weights(part, weights))
             self._checkpoint(path).unlink(missing_ok=True)
         return load_weights(path)
+
+    @staticmethod
+    def _teacher(variant: Variant) -> Variant | None:
+        return variants()[variant.teacher] if variant.teacher else None
 
     @staticmethod
     def _checkpoint(path: Path) -> Path:
@@ -84,16 +94,22 @@ class Trainings:
     def _views(self, variant: Variant) -> Named:
         """All views as training rows."""
         is_paper = variant.config.preset != "gain-curve"
-        key = key_of(variant.taught, variant.inputs, variant.is_augmented, is_paper)
+        key = key_of(variant.taught, variant.inputs, variant.augmentation, is_paper)
         if self._kept[0] != key:
             self._kept = ("", [])  # first of all: two data sets would take twice the memory
-            remaps: list[tuple[ViewRow, Remap | None]] = [(row, None) for row in self.rows]
-            if variant.is_augmented:
-                remaps += [(row, remap) for row in self.rows if row.mode == _REMAPPED_MODE for remap in REMAPS]
-            read = [(row.asset, self._read(row, variant, remap, is_paper)) for row, remap in remaps]
-            # DHOIT's labels are those of scored budgets: a view without one has none.
-            self._kept = (key, [(asset, x) for asset, x in read if x.rows and (len(x.anchors) or not is_paper)])
+            read = [(row.asset, view) for row in self.rows for view in self._of(row, variant, is_paper)]
+            self._kept = (key, [(asset, view) for asset, view in read if view.rows])
         return self._kept[1]
+
+    def _of(self, row: ViewRow, variant: Variant, is_paper: bool) -> Iterator[ViewData]:
+        """A view, and what is made of it to be trained on as well."""
+        own = self._read(row, variant, None, is_paper)
+        yield own
+        if variant.augmentation == "colours":
+            yield replace(own, features=recoloured(own.features, seed=int(row.digest[:8], 16)))
+        elif variant.augmentation is not None and row.mode == _REMAPPED_MODE:
+            for remap in REMAPS[variant.augmentation]:
+                yield self._read(row, variant, remap, is_paper)
 
     def _read(self, row: ViewRow, variant: Variant, remap: Remap | None, is_paper: bool) -> ViewData:
         shard = read_shard(labels_of(self.store, row, variant.taught, remap).shard)

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal
 
-from benchmarks.predicting.inputs import Inputs
+from benchmarks.predicting.augmentation import Augmentation
+from benchmarks.predicting.inputs import BLOCKS, Inputs
 from renderer.features import FEATURES, FEATURES_GLSL
 from schemas.network import SIZES
 from schemas.tail import DEFAULT_TAIL, TailName
@@ -35,7 +36,9 @@ class Variant:
         config: How it is trained.
         labels: Tail of the curves that it learns from; None: that of the frames.
         inputs: What it reads of a pixel's neighbourhood or view.
-        is_augmented: Whether views with other opacities are trained on as well.
+        augmentation: Views that are trained on as well; None: none.
+        teacher: The variant whose answers it learns, trained on the same views; empty: none.
+        teaching: Share of the loss that is the teacher's.
         feedback: What corrects its curves after a first frame; None: nothing.
         turns: How often.
         base: The variant that it is compared with; empty: none.
@@ -47,7 +50,9 @@ class Variant:
     config: TrainConfig = field(default_factory=TrainConfig)
     labels: TailName | None = None
     inputs: Inputs = "plain"
-    is_augmented: bool = False
+    augmentation: Augmentation | None = None
+    teacher: str = ""
+    teaching: float = 0.0
     feedback: Feedback | None = None
     turns: int = 0
     base: str = DEFAULT
@@ -117,15 +122,31 @@ def _variants() -> Iterator[Variant]:
     }
     for name, changes in losses.items():
         yield Variant(name, "losses", config=TrainConfig(**changes))
+    taught: dict[str, Any] = {
+        "config": TrainConfig.sized("small"),
+        "teacher": f"full, {DEFAULT}",
+        "base": f"small, {DEFAULT}",
+    }
+    for name, teaching in {"distilled": 1.0, "distilled, half regret": 0.5}.items():
+        yield Variant(name, "losses", teaching=teaching, **taught)
     for seed in (1, 2):
         yield Variant(f"seed {seed}", "seeds", config=TrainConfig(seed=seed))
     yield Variant("labels of density", "labels", labels="density", base="without depth bins")
     yield Variant("labels of density-8", "labels", labels="density-8")
     yield from _presets()
-    yield Variant("other opacities", "augmentation", is_augmented=True)
+    augmentations: dict[str, Augmentation] = {
+        "other opacities": "opacities",
+        "colours permuted": "colours",
+        "cuts": "cuts",
+    }
+    for name, augmentation in augmentations.items():
+        yield Variant(name, "augmentation", augmentation=augmentation)
     trials: tuple[Inputs, ...] = ("neighbourhood", "view-means", "view-normalised")
     for inputs in trials:
         yield Variant(inputs, "inputs", SPARE, inputs=inputs, base=SPARE)
+    for inputs in BLOCKS:
+        for tail in (DEFAULT, SPARE):
+            yield Variant(f"{inputs}, {tail}", "inputs", tail, inputs=inputs, base=tail)
     kinds: tuple[Feedback, ...] = ("colour", "error")
     for feedback in kinds:
         for turns in (1, 2):

@@ -22,7 +22,11 @@ FEW = {
         "paper-repaired", "presets", "density-8", TrainConfig.of("paper-repaired", steps=5, validate_every=5)
     ),
     "around": Variant("around", "inputs", "density-8", SHORT, inputs="neighbourhood"),
-    "opacities": Variant("opacities", "augmentation", "density-16", SHORT, is_augmented=True),
+    "opacities": Variant("opacities", "augmentation", "density-16", SHORT, augmentation="opacities"),
+    "colours": Variant("colours", "augmentation", "density-16", SHORT, augmentation="colours"),
+    "cuts": Variant("cuts", "augmentation", "density-16", SHORT, augmentation="cuts"),
+    "half": Variant("half", "inputs", "density-16", SHORT, inputs="half-resolution"),
+    "distilled": Variant("distilled", "losses", "density-16", SHORT, teacher="density-16", teaching=0.5),
 }
 
 
@@ -33,7 +37,7 @@ def folder(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Pa
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (predictors, variants):
+    for module in (predictors, variants, training):
         monkeypatch.setattr(module, "variants", lambda: FEW)
 
 

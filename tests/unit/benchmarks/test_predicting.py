@@ -16,7 +16,7 @@ from benchmarks.labelling.plot import Labels, log_log
 from benchmarks.predicting import tail_kernels
 from benchmarks.predicting.cost import Cost, memory_of, network_cost, rule_cost
 from benchmarks.predicting.feedback import DAMPING, MOST, corrected, observed
-from benchmarks.predicting.inputs import REMAPS, changed, remapped
+from benchmarks.predicting.inputs import changed
 from benchmarks.predicting.page import proposals
 from benchmarks.predicting.scoring import gain_counts, ratio
 from benchmarks.predicting.store import CODE, Store, key_of
@@ -25,9 +25,10 @@ from benchmarks.predicting.tail_kernels import errors_with, exponents_with
 from benchmarks.predicting.tails import trials
 from benchmarks.predicting.training import folds_of
 from benchmarks.predicting.variants import variants, without_texel
-from labeller.curves import check_dump, error_curves
+from labeller.curves import error_curves
 from labeller.reference import pixel_of as plain_pixel
 from labeller.reference import tail_weights
+from renderer.depth_bins import OPTICAL
 from renderer.features import FEATURES, derive, gather, texels_of
 from renderer.reference.moment import share_before, warped
 from schemas.tail import DENSITY_G, TAILS
@@ -88,7 +89,7 @@ def test_the_power_fits_the_mean_depth() -> None:
         z, n = DUMP.depth[part].astype(np.float64), part.stop - part.start
         if n < 3 or z[-1] == z[0]:
             continue
-        optical, x = tail_kernels.OPTICAL[DUMP.rgba[part, 3]], (z - z[0]) / (z[-1] - z[0])
+        optical, x = OPTICAL[DUMP.rgba[part, 3]], (z - z[0]) / (z[-1] - z[0])
         for i in range(n):
             others = np.delete(np.arange(n), i)
             mean = np.clip(np.average(x[others], weights=optical[others]), 0.02, 0.98)
@@ -118,8 +119,11 @@ def test_variants_differ_from_their_base_and_name_it() -> None:
         assert variant.base == "" or variant.base in every
         assert set(variant.config.features) <= set(FEATURES)
         assert variant.tail in TAILS
+        if variant.teacher:
+            assert (every[variant.teacher].taught, every[variant.teacher].inputs) == (variant.taught, variant.inputs)
+            assert 0.0 < variant.teaching <= 1.0
     tried = [variant for variant in every.values() if variant.part != "bundles"]  # what is shipped may be the default
-    said = [(v.tail, v.config.decisive, v.labels, v.inputs, v.is_augmented, v.feedback, v.turns) for v in tried]
+    said = [replace(variant, name="", part="variants", base="") for variant in tried]
     assert len(set(said)) == len(said)
 
 
@@ -217,15 +221,6 @@ def test_changed_inputs() -> None:
     assert relative.mean(axis=0) == pytest.approx(np.zeros(len(FEATURES)), abs=1e-3)
     assert relative[:, 0].std() == pytest.approx(1.0, abs=1e-3)
     assert len(np.unique(changed(features, "view-means", DUMP.width)[:, FEATURES.index("front_1")])) == 1
-
-
-@pytest.mark.parametrize("remap", REMAPS)
-def test_other_opacities_keep_everything_else(remap: str) -> None:
-    made = remapped(DUMP, remap)  # type: ignore[arg-type]
-    check_dump(made)
-    assert np.array_equal(made.rgba[:, :3], DUMP.rgba[:, :3])
-    assert 0 < made.rgba[:, 3].min() <= made.rgba[:, 3].max() < 255
-    assert (len(np.unique(made.rgba[:, 3])) > 1) == (remap == "by colour")
 
 
 def test_results_are_remembered_by_key(tmp_path: Path) -> None:

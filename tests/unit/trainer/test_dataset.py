@@ -16,7 +16,8 @@ from labeller.hull import lower_hulls
 from labeller.shards import read_shard, write_shard
 from renderer.features import FEATURES
 from schemas.problem import Problem
-from trainer.dataset import GROUP, SEGMENTS, Drawing, ViewData, load_shards, make_view, normalisation, sample_batch
+from trainer.dataset import GROUP, Drawing, ViewData, load_shards, make_view, normalisation, sample_batch
+from trainer.segments import SEGMENTS
 
 
 def view_of(hulls: list[tuple[list[int], list[float]]], prices: tuple[float, float] = (-9.0, -1.0)) -> ViewData:

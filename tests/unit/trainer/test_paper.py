@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.training import random_paper_view, random_view, random_weights
 
 from schemas.problem import Problem
+from trainer.config import Preset
 from trainer.dataset import GROUP, Drawing, ViewData
 from trainer.evaluate import evaluate, geometric_mean
 from trainer.paper import PAPER_FEATURES, importance_counts, paper_batch, paper_inputs
@@ -88,6 +91,28 @@ def test_both_fills_are_scored_against_the_optimum(views: list[ViewData]) -> Non
     weights = train(views, (), TrainConfig.of("paper-repaired", steps=1)).weights
     printed, filled = (geometric_mean(evaluate(weights, views, fill)) for fill in ("paper", "budget"))
     assert 1.0 <= filled < printed
+
+
+def _unscored(view: ViewData) -> ViewData:
+    """A view whose budgets suffice with fragments to spare: none of them has a price."""
+    assert view.paper is not None
+    return replace(view, asset="c", anchors=np.zeros(0), paper=replace(view.paper, budgets=()))
+
+
+@pytest.mark.parametrize("preset", ["paper", "paper-repaired"])
+def test_a_view_without_a_price_changes_nothing(preset: Preset, views: list[ViewData]) -> None:
+    config = TrainConfig.of(preset, steps=3, validate_every=3)
+    alone, beside = (train(given, (), config).weights for given in (views, [*views, _unscored(views[0])]))
+    assert alone.digest() == beside.digest()
+
+
+@pytest.mark.parametrize("preset", ["paper", "paper-repaired"])
+def test_views_without_any_price_are_refused(preset: Preset, views: list[ViewData]) -> None:
+    config, unscored = TrainConfig.of(preset, steps=1), [_unscored(views[0])]
+    with pytest.raises(Problem, match=r"scored at a budget"):
+        train(unscored, (), config)
+    with pytest.raises(Problem, match=r"No validation view is scored"):
+        train(views, unscored, config)
 
 
 def test_rows_without_depths_are_refused() -> None:
