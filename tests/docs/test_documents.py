@@ -25,6 +25,7 @@ DOCUMENTS = (
     "deploy/README.md",
     "docs/SERVICE.md",
     "docs/BUNDLE.md",
+    "docs/CLIENTS.md",
 )
 
 DISTRIBUTIONS = {

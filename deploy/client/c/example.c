@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Prints what a bundle is, tests it on this machine, and spends a budget on a few pixels.
+ *
+ *     cc -std=c99 -O2 -o example example.c -lm && ./example BUNDLE
+ */
+#define DIAPHANE_BUNDLE_IMPLEMENTATION
+#include "diaphane_bundle.h"
+
+static int spend(const DiaphaneBundle *bundle) {
+    enum { PIXELS = 4 };
+    uint32_t n[PIXELS] = {0, 1, 6, 12}, k[PIXELS];
+    float a[PIXELS] = {0}, b[PIXELS] = {0}, y[DIAPHANE_MAX_OUTPUTS], x[DIAPHANE_FEATURES];
+    DiaphaneSolution found;
+    DiaphaneError error;
+    for (int p = 2; p < PIXELS; ++p) { /* a renderer has sums of its own: diaphane_features */
+        for (int i = 0; i < bundle->features; ++i)
+            x[i] = (float)bundle->test_features[(size_t)p * (size_t)bundle->features + (size_t)i];
+        if (!diaphane_predict(bundle, x, y)) return 0;
+        a[p] = y[0];
+        b[p] = y[1];
+    }
+    if (!diaphane_solve(a, b, n, PIXELS, 9, k, &found, &error)) {
+        fprintf(stderr, "%s\n", error.text);
+        return 0;
+    }
+    printf("budget 9: slots %u %u %u %u, log lambda %.6g\n", k[0], k[1], k[2], k[3], found.log_lambda);
+    return 1;
+}
+
+int main(int argc, char **argv) {
+    static const char *const outputs[] = {"a", "b", "g", "importance"};
+    DiaphaneBundle bundle;
+    DiaphaneError error;
+    int passed;
+    if (argc != 2) {
+        fprintf(stderr, "usage: example BUNDLE\n");
+        return 2;
+    }
+    if (!diaphane_load(&bundle, argv[1], &error)) {
+        fprintf(stderr, "%s\n", error.text);
+        return 1;
+    }
+    printf("%s: tail %s, metric %s, %d files\n", bundle.name, bundle.tail, bundle.metric, bundle.files);
+    printf("reads:");
+    for (int i = 0; i < bundle.features; ++i) printf(" %s", diaphane_feature_name(bundle.feature[i]));
+    printf("\nunits:");
+    for (int i = 0; i <= bundle.layers; ++i) printf(" %d", (int)bundle.units[i]);
+    printf("\nanswers:");
+    for (int i = 0; i < bundle.outputs; ++i) printf(" %s", outputs[bundle.output[i]]);
+    passed = diaphane_self_test(&bundle, &error);
+    printf("\nself-test: %s\n", passed ? "passed" : error.text);
+    if (passed && bundle.head == DIAPHANE_GAIN_CURVE && bundle.test_rows >= 4) passed = spend(&bundle);
+    diaphane_free(&bundle);
+    return !passed;
+}

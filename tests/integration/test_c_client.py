@@ -1,0 +1,314 @@
+"""The C header compiled with a C and a C++ compiler, against bundles of this export: answers, slots, hostile files."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import safetensors.numpy
+from numpy.typing import NDArray
+from support.dumps import random_dump
+from support.training import random_weights
+
+from renderer.allocation.fill import solve_lambda
+from renderer.allocation.lattice import MOST_FRAGMENTS, curves_of, price, solve_on_lattice
+from renderer.features import FEATURES, derive, gather
+from schemas.bundle import MANIFEST, UBO_DATA, WEIGHTS, WGSL, ParityReport, Provenance, TailSpec, file_spec
+from schemas.tail import TailName
+from trainer.bundle import Description, load_bundle, write_bundle
+from trainer.weights import Weights
+
+ROOT = Path(__file__).resolve().parents[2]
+CLIENT = ROOT / "deploy" / "client" / "c"
+WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror")
+SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g")
+STANDARDS = {"cc": ("-std=c99",), "g++": ("-x", "c++", "-std=c++17")}
+
+pytestmark = pytest.mark.skipif(
+    any(shutil.which(name) is None for name in STANDARDS), reason="there is no C compiler: apt-get install gcc g++"
+)
+
+NETWORKS: dict[str, tuple[Weights, TailName]] = {
+    "default": (random_weights(1), "density-16"),
+    "paper": (random_weights(2, FEATURES[:12], (128, 64), "importance", ("importance",)), "weighted-average"),
+    "g": (random_weights(3, FEATURES[3:30], (64, 32), outputs=("a", "b", "g")), "density"),
+    "linear": (random_weights(4, FEATURES[:3], ()), "density-8"),
+}
+
+
+@pytest.fixture(scope="module")
+def sums() -> NDArray[np.float32]:
+    """Raw sums of pixels with fragments, float32 [pixels, 44]."""
+    dump = random_dump(40, 40, 12, seed=1)
+    return gather(dump, bins=16)[dump.counts > 0]
+
+
+def export(folder: Path, weights: Weights, tail: TailName, features: NDArray[np.float32]) -> Path:
+    """A bundle whose forms nobody compared: that takes a GL context and is tested elsewhere."""
+    provenance = Provenance(scenes={}, code_version="0", seed=0, machine='a "machine" \\ ö')
+    described = Description("glass", TailSpec(name=tail, g=0.75), "display", 1, provenance, {"deep": [[[1.5e-3]]]})
+    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver="none")
+    write_bundle(folder, weights, described, features, lambda: parity)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def bundles(tmp_path_factory: pytest.TempPathFactory, sums: NDArray[np.float32]) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("bundles")
+    return {name: export(folder / name, *network, derive(sums)) for name, network in NETWORKS.items()}
+
+
+@pytest.fixture(scope="module")
+def probe(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
+    """Runs the probe, with sanitizers that end it at the first fault."""
+    program = tmp_path_factory.mktemp("probe") / "probe"
+    source = ROOT / "tests" / "support" / "client_probe.c"
+    options = ("-std=c99", "-O1", *WARNINGS, *SANITIZERS, f"-I{CLIENT}")
+    subprocess.run(["cc", *options, "-o", program, source, "-lm"], check=True)
+
+    def run(*words: object) -> str:
+        done = subprocess.run([program, *map(str, words)], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr[-4000:]
+        return done.stdout
+
+    return run
+
+
+@pytest.mark.parametrize("compiler", STANDARDS)
+def test_the_example_tests_a_bundle(bundles: dict[str, Path], tmp_path: Path, compiler: str) -> None:
+    program = tmp_path / "example"
+    options = (*STANDARDS[compiler], "-O1", *WARNINGS)
+    subprocess.run([compiler, *options, "-o", program, CLIENT / "example.c", "-lm"], check=True)
+    for name, folder in bundles.items():
+        done = subprocess.run([program, folder], capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+        weights, tail = NETWORKS[name]
+        assert f"glass: tail {tail}, metric display, 11 files\n" in done.stdout
+        assert f"reads: {' '.join(weights.features)}\n" in done.stdout
+        assert f"answers: {' '.join(weights.outputs)}\nself-test: passed\n" in done.stdout
+    assert subprocess.run([program, tmp_path], capture_output=True, text=True).stderr.startswith("there is no manifest")
+
+
+@pytest.mark.parametrize("name", NETWORKS)
+def test_features_and_answers_are_those_of_the_trainer(
+    bundles: dict[str, Path], probe: Callable[..., str], tmp_path: Path, sums: NDArray[np.float32], name: str
+) -> None:
+    weights = load_bundle(bundles[name]).weights
+    rows = np.concatenate([sums, np.zeros((1, sums.shape[1]), np.float32)])
+    rows.tofile(tmp_path / "sums")
+    assert probe("features", bundles[name], tmp_path / "sums", tmp_path / "features") == ""
+    found = np.fromfile(tmp_path / "features", np.float32).reshape(len(rows), -1)
+    # Both round every product by itself, so that the spreads agree too.
+    np.testing.assert_allclose(found, derive(rows)[:, weights.columns], rtol=1e-5, atol=1e-5)
+
+    found[:, 0] *= 100.0  # beyond what normalised features are clamped to
+    found.tofile(tmp_path / "features")
+    assert probe("predict", bundles[name], tmp_path / "features", tmp_path / "answers") == ""
+    answers = np.fromfile(tmp_path / "answers", np.float32).reshape(len(rows), -1)
+    expected = weights.answer(found)
+    assert (np.abs(answers - expected) / np.maximum(1.0, np.abs(expected))).max() <= 1e-5
+
+
+def test_features_that_are_not_finite_have_no_answer(
+    bundles: dict[str, Path], probe: Callable[..., str], tmp_path: Path
+) -> None:
+    rows = np.zeros((4, len(FEATURES)), np.float32)
+    rows[1, 3], rows[3, -1] = np.nan, -np.inf
+    rows.tofile(tmp_path / "rows")
+    assert probe("predict", bundles["default"], tmp_path / "rows", tmp_path / "answers") == "refused 1\nrefused 3\n"
+
+
+Problem = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint32]]
+
+
+def solved(probe: Callable[..., str], folder: Path, problem: Problem, budget: int) -> tuple[NDArray[np.uint32], str]:
+    (folder / "curves").write_bytes(b"".join(part.tobytes() for part in problem))
+    said = probe("solve", len(problem[2]), budget, folder / "curves", folder / "k")
+    return np.fromfile(folder / "k", np.uint32), said
+
+
+def curves(seed: int, spread: float, most: int) -> Problem:
+    rng = np.random.default_rng(seed)
+    n = rng.integers(0, most, 3000)
+    a, b = rng.normal(-8.0, spread, len(n)), 0.02 + rng.exponential(0.3, len(n))
+    return a.astype(np.float32), b.astype(np.float32), n.astype(np.uint32)
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        pytest.param(curves(1, 3.0, 12), id="usual"),
+        pytest.param(curves(2, 0.0, 3), id="ties"),
+        pytest.param(curves(3, 1e30, 40), id="steep"),
+        pytest.param((*curves(4, 3.0, 5)[:2], curves(4, 3.0, 2 * MOST_FRAGMENTS)[2]), id="deep"),
+        pytest.param(tuple(x[:1] for x in curves(5, 1.0, 9)), id="one pixel"),
+    ],
+)
+def test_slots_are_those_of_the_shaders_twin(probe: Callable[..., str], tmp_path: Path, problem: Problem) -> None:
+    a, b, n = problem
+    usable = int(np.minimum(n, MOST_FRAGMENTS).sum(dtype=np.int64))
+    occupied = np.count_nonzero(n)
+    for budget in {0, max(occupied - 1, 0), occupied, usable // 3, usable // 2, max(usable - 1, 0), usable, 2 * usable}:
+        k, said = solved(probe, tmp_path, problem, budget)
+        expected = solve_on_lattice(curves_of(a, b), n, budget)
+        np.testing.assert_array_equal(k, expected.k)
+        assert k.sum(dtype=np.int64) == min(budget, usable)
+        k_min, complete, index, log_lambda, total = said.split()
+        assert int(total) == min(budget, usable)
+        assert (int(complete), int(k_min)) == (expected.index is None, budget >= occupied)
+        if expected.index is not None:
+            assert int(index) == expected.index
+            assert float(log_lambda) == -price(expected.index)
+
+
+def test_slots_are_near_those_at_the_exact_lambda(probe: Callable[..., str], tmp_path: Path) -> None:
+    problem = curves(6, 3.0, 20)
+    budget = int(problem[2].sum()) // 3
+    k, said = solved(probe, tmp_path, problem, budget)
+    exact, log_lambda = solve_lambda(*problem, budget, 1)
+    assert abs(float(said.split()[3]) - log_lambda) <= 2**-10  # one step of the prices
+    assert np.abs(k - exact).max() <= 1
+    assert np.count_nonzero(k != exact) <= 1e-3 * len(k) + 8
+
+
+def test_a_curve_that_is_not_one_is_refused(probe: Callable[..., str], tmp_path: Path) -> None:
+    a, b = np.zeros(3, np.float32), np.ones(3, np.float32)
+    n = np.array([0, 1, 5], np.uint32)
+    (tmp_path / "k").touch()
+    for value in (np.nan, np.inf, 0.0, -1.0):
+        b[:2], b[2] = np.nan, value  # the first two have no choice
+        assert "gain curve of pixel 2" in solved(probe, tmp_path, (a, b, n), 3)[1]
+    b[2] = 1.0
+    assert solved(probe, tmp_path, (a, b, n), 3)[0].tolist() == [0, 1, 2]
+
+
+# What is wrong with a bundle -> what the reader says.
+Damage = Callable[[Path], object]
+
+
+def edit(change: Callable[[dict[str, Any]], object]) -> Damage:
+    def damage(folder: Path) -> None:
+        manifest = json.loads((folder / MANIFEST).read_text())
+        change(manifest)
+        (folder / MANIFEST).write_text(json.dumps(manifest))
+
+    return damage
+
+
+def set_to(value: object, *keys: str | int) -> Damage:
+    def change(manifest: Any) -> None:
+        for key in keys[:-1]:
+            manifest = manifest[key]
+        manifest[keys[-1]] = value
+
+    return edit(change)
+
+
+def reweighed(change: Callable[[bytes], bytes]) -> Damage:
+    """Other weights, listed with their own size and hash."""
+
+    def damage(folder: Path) -> None:
+        (folder / WEIGHTS).write_bytes(change((folder / WEIGHTS).read_bytes()))
+        set_to(file_spec(folder / WEIGHTS).model_dump(), "files", WEIGHTS)(folder)
+
+    return damage
+
+
+def text(change: Callable[[str], str]) -> Damage:
+    return lambda folder: (folder / MANIFEST).write_text(change((folder / MANIFEST).read_text()))
+
+
+LONG = (1 << 40).to_bytes(8, "little")
+NAN = np.float32(np.nan).tobytes()
+DAMAGED: dict[str, tuple[Damage, str]] = {
+    "no manifest": (lambda folder: (folder / MANIFEST).unlink(), "there is no manifest.json"),
+    "empty": (text(lambda _: ""), "no JSON"),
+    "cut": (text(lambda whole: whole[:-3]), "no JSON"),
+    "more after it": (text(lambda whole: whole + "{}"), "no JSON"),
+    "a zero byte": (text(lambda whole: whole + "\0"), "no JSON"),
+    "deep": (text(lambda _: "[" * 100_000), "nested more than 64 deep"),
+    "huge": (text(lambda whole: whole + " " * (1 << 20)), "more than 1048576 bytes"),
+    "an array": (text(lambda _: "[1]"), "keys of a bundle"),
+    "unknown key": (set_to(1, "extra"), "keys of a bundle"),
+    "key twice": (text(lambda whole: whole.replace('"k_min"', '"k_min": 1, "k_min"')), "keys of a bundle"),
+    "key missing": (edit(lambda manifest: manifest.pop("layers")), "keys of a bundle"),
+    "format": (set_to("diaphane-bundle/3", "format"), "update this reader"),
+    "name": (set_to("../glass", "name"), "name"),
+    "long name": (set_to("g" * 65, "name"), "name"),
+    "tail": (set_to("density-32", "tail", "name"), "tail"),
+    "head": (set_to("gain", "head"), "head"),
+    "outputs": (set_to(["b", "a"], "outputs"), "outputs"),
+    "feature": (set_to("colour", "features", 0, "name"), "feature 0"),
+    "feature twice": (set_to("log_n", "features", 1, "name"), "feature 1"),
+    "no features": (set_to([], "features"), "features"),
+    "nan": (text(lambda whole: whole.replace('"mean": ', '"mean": NaN, "m": ', 1)), "no JSON"),
+    "infinite": (text(lambda whole: whole.replace('"mean": ', '"mean": 1e999, "m": ', 1)), "feature 0"),
+    "infinite float": (set_to(1e300, "features", 0, "std"), "log_n"),
+    "spread": (set_to(0.0, "features", 0, "std"), "log_n"),
+    "tiny spread": (set_to(1e-60, "features", 0, "std"), "log_n"),
+    "units": (set_to([1 << 40, 16], "hidden"), "hidden layer"),
+    "fraction": (set_to([32.5, 16], "hidden"), "hidden layer"),
+    "depth": (set_to([1] * 9, "hidden"), "hidden"),
+    "other units": (set_to([32, 17], "hidden"), "layer1.weight"),
+    "files": (edit(lambda manifest: manifest["files"].pop(UBO_DATA)), "files"),
+    "path": (edit(lambda m: m["files"].update({"../x": m["files"].pop(WGSL)})), WGSL),
+    "size": (set_to(1 << 50, "files", WEIGHTS, "bytes"), WEIGHTS),
+    "negative": (set_to(-1, "files", WEIGHTS, "bytes"), WEIGHTS),
+    "sha": (set_to("0" * 63 + "G", "files", WEIGHTS, "sha256"), "hexadecimal"),
+    "self-test": (set_to([[1.0]], "self_test", "features"), "self-test"),
+    "no self-test": (set_to(None, "self_test"), "self-test"),
+    "changed": (lambda folder: (folder / WGSL).write_text("x"), WGSL),
+    "missing": (lambda folder: (folder / UBO_DATA).unlink(), UBO_DATA),
+    "longer": (lambda folder: (folder / WGSL).open("a").write("x"), WGSL),
+    "folder": (lambda folder: ((folder / WGSL).unlink(), (folder / WGSL).mkdir()), WGSL),
+    "cut weights": (lambda folder: (folder / WEIGHTS).write_bytes(b"cut"), "size or sha256"),
+    "no weights": (reweighed(lambda _: b""), "is cut"),
+    "short header": (reweighed(lambda whole: whole[:40]), "is cut"),
+    "long header": (reweighed(lambda whole: LONG + whole[8:]), "header is too long"),
+    "short payload": (reweighed(lambda whole: whole[:-4]), "tensors of the manifest"),
+    "offsets": (reweighed(lambda whole: whole.replace(b"[0,128]", b"[8,128]")), "layer 0"),
+    "beyond": (reweighed(lambda whole: whole.replace(b"[0,128]", b"[9e9,9]")), "layer 0"),
+    "header": (reweighed(lambda whole: whole.replace(b"[0,128]", b"[0,128}")), "damaged header"),
+    "dtype": (reweighed(lambda whole: whole.replace(b'"F32"', b'"F16"', 1)), "layer 0"),
+    "nan weight": (reweighed(lambda whole: whole[:-4] + NAN), "not finite"),
+}
+
+
+def test_damaged_bundles_are_refused_with_a_reason(
+    bundles: dict[str, Path], probe: Callable[..., str], tmp_path: Path
+) -> None:
+    folders = {name: tmp_path / str(number) for number, name in enumerate(DAMAGED)}
+    for name, (damage, _) in DAMAGED.items():
+        shutil.copytree(bundles["default"], folders[name])
+        damage(folders[name])
+    said = probe("check", bundles["default"], *folders.values()).splitlines()
+    assert said.pop(0) == "ok glass: passed"
+    expected = {name: reason for name, (_, reason) in DAMAGED.items()}
+    found = dict(zip(DAMAGED, said, strict=True))
+    assert {name: line for name, line in found.items() if line.startswith("ok") or expected[name] not in line} == {}
+
+
+def test_a_wrong_weight_fails_the_self_test(
+    bundles: dict[str, Path], tmp_path: Path, probe: Callable[..., str]
+) -> None:
+    folder = tmp_path / "bundle"
+    shutil.copytree(bundles["default"], folder)
+    tensors = safetensors.numpy.load_file(folder / WEIGHTS)
+    tensors["layer2.bias"] += np.float32(1e-2)
+    reweighed(lambda _: safetensors.numpy.save(tensors))(folder)
+    assert probe("check", folder).startswith("ok glass: row 0, output")
+
+
+@pytest.mark.parametrize("name", ["default", "paper"])
+def test_hundreds_of_mutations_end_without_a_fault(
+    bundles: dict[str, Path], probe: Callable[..., str], name: str
+) -> None:
+    manifests, weights = map(int, probe("fuzz", bundles[name], 7, 400).split())
+    assert manifests < 100  # most are refused
+    assert 0 < weights < 300  # and of the weights those that are still weights are read
