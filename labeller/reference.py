@@ -86,8 +86,29 @@ def binned_exponents(depth: NDArray[np.float64], optical: NDArray[np.float64], b
         bins: B.
 
     Returns:
-        float64 [n]. Bins are found in float32, as shaders do, so that both agree on the bin of every fragment, and
-        count in whole units.
+        float64 [n].
+    """
+    y, steps = depth_bins(depth, optical, bins)
+    place = np.minimum(y.astype(np.int32), bins - 1)
+    kept = steps / SHARE_LEVELS * optical.sum()
+    others = np.maximum(kept[place + 1] - kept[place] - optical, 0.0)
+    return np.asarray(kept[place] + others * (y - place))
+
+
+def depth_bins(
+    depth: NDArray[np.float64], optical: NDArray[np.float64], bins: int
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Where fragments lie among a pixel's depth bins, and what is kept of these (METHOD section 2).
+
+    Args:
+        depth: float64 [n], float32 values, ascending, n > 0.
+        optical: float64 [n], `-ln(1 - a)`.
+        bins: B.
+
+    Returns:
+        float32 [n], bin and position in it as one number, and int64 [B+1], of `1 / SHARE_LEVELS`, the share of the
+        optical depth in front of each bin, and of all. Bins are found in float32, as shaders do, so that both agree on
+        the bin of every fragment, and count in whole units.
     """
     z = depth.astype(np.float32)
     extent = z[-1] - z[0]
@@ -98,9 +119,7 @@ def binned_exponents(depth: NDArray[np.float64], optical: NDArray[np.float64], b
     counts = [min(sum(u for u, b in zip(units, place, strict=True) if b == bin_), BIN_LIMIT) for bin_ in range(bins)]
     front = [sum(counts[:b]) for b in range(bins + 1)]
     steps = [(2 * SHARE_LEVELS * f + front[-1]) // (2 * front[-1]) if front[-1] else 0 for f in front]
-    kept = np.array(steps) / SHARE_LEVELS * optical.sum()
-    others = np.maximum(kept[place + 1] - kept[place] - optical, 0.0)
-    return np.asarray(kept[place] + others * (y - place))
+    return y, np.array(steps, dtype=np.int64)
 
 
 def composite(pixel: Pixel, k: int, tail: TailName = DEFAULT_TAIL, g: float = DENSITY_G) -> Colour:

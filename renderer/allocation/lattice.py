@@ -62,17 +62,30 @@ class Solution:
     rounds: int
 
 
-def curves_of(a: NDArray[np.floating], b: NDArray[np.floating]) -> Curves:
-    """Gain curves within the limits of the search.
+def within_limits(a: NDArray[np.floating], b: NDArray[np.floating]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """What a network answered, as numbers that a search can take.
+
+    A network of finite weights can overflow, and answer infinity or, as a difference of such, NaN. NaN says nothing of
+    a pixel, so that it comes last: the least gain, the fastest decay. `kbuffer-deep/curves.comp` has it so, too.
 
     Args:
-        a: [P], log gain of the first fragment; finite.
-        b: [P], decay of the log gain per fragment; finite, > 0.
+        a: [P], log gain of the first fragment.
+        b: [P], decay of the log gain per fragment, > 0 or NaN.
+
+    Returns:
+        float32 [P] each: |a| <= MOST_GAIN, 1 / MOST_RATE <= b <= 1 / LEAST_RATE.
     """
     with np.errstate(over="ignore"):
-        rate = np.float32(1.0) / np.asarray(b, dtype=np.float32)
-    clamped = np.clip(np.asarray(a, dtype=np.float32), np.float32(-MOST_GAIN), np.float32(MOST_GAIN))
-    return Curves(clamped, np.clip(rate, np.float32(LEAST_RATE), np.float32(MOST_RATE)))
+        gain, decay = np.asarray(a, dtype=np.float32), np.asarray(b, dtype=np.float32)
+    # Of NaN and another number, fmin and fmax are the other.
+    gain = np.fmin(np.fmax(gain, np.float32(-MOST_GAIN)), np.float32(MOST_GAIN))
+    return gain, np.fmax(np.fmin(decay, np.float32(1.0 / LEAST_RATE)), np.float32(1.0 / MOST_RATE))
+
+
+def curves_of(a: NDArray[np.floating], b: NDArray[np.floating]) -> Curves:
+    """Gain curves within the limits of the search; arguments as `within_limits` has them."""
+    gain, decay = within_limits(a, b)
+    return Curves(gain, np.float32(1.0) / decay)
 
 
 def price(index: int) -> np.float32:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from renderer import timing
 from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
 from renderer.allocation.gpu import CURVE_BYTES, CURVE_DEFINES, LIST_BYTES, FrameAllocation, GpuAllocation
+from renderer.allocation.lattice import within_limits
 from renderer.features import TEXELS, texels_of
 from renderer.frame import ALL_TEXELS, BIN_DEFINES, Clock, Frame, Gathered, front_bytes
 from renderer.gpu_scene import set_uniforms
@@ -228,10 +229,11 @@ class KBufferDeep:
             answers = self.predict(frame, open_pixels)
         with clock.measure("lambda"):
             left = fragments - int(slots.sum(dtype=np.int64)) + k_min * len(open_pixels)
-            if self.manifest.head == "importance":
-                slots[open_pixels] = budget_fill(answers[:, 0], n[open_pixels], left, k_min)
+            if self.manifest.head == "importance":  # NaN, of a network that overflows, is no importance
+                slots[open_pixels] = budget_fill(np.nan_to_num(answers[:, 0]), n[open_pixels], left, k_min)
             else:
-                slots[open_pixels], _ = solve_lambda(answers[:, 0], answers[:, 1], n[open_pixels], left, k_min)
+                a, b = within_limits(answers[:, 0], answers[:, 1])
+                slots[open_pixels], _ = solve_lambda(a, b, n[open_pixels], left, k_min)
         return slots, settled
 
     def predict(self, frame: Frame, pixels: NDArray[np.uint32]) -> NDArray[np.float32]:

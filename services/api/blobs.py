@@ -10,6 +10,7 @@ from fastapi import APIRouter, Depends, Request, Response
 
 from services.api.answers import Hashes, Missing
 from services.api.body import JsonBody
+from services.api.etags import is_current
 from services.api.parts import BlobHash, Services
 from services.api.security import Needs
 from services.api.streams import FileRange
@@ -54,7 +55,7 @@ def find_missing(body: Annotated[Hashes, Depends(JsonBody(Hashes))], service: Se
 async def head_blob(sha256: BlobHash, request: Request, service: Services) -> Response:
     """Size and ETag of a file."""
     size = await _size(service, sha256)
-    if _matches(request.headers.get("if-none-match"), sha256):
+    if is_current(request.headers.get("if-none-match"), sha256):
         return Response(status_code=304, headers=_headers(sha256))
     return Response(headers={**_headers(sha256), "Content-Length": str(size)}, media_type=FileRange.media_type)
 
@@ -64,7 +65,7 @@ async def read_blob(sha256: BlobHash, request: Request, service: Services) -> Re
     """A file, or one range of it."""
     size = await _size(service, sha256)
     headers = _headers(sha256)
-    if _matches(request.headers.get("if-none-match"), sha256):
+    if is_current(request.headers.get("if-none-match"), sha256):
         return Response(status_code=304, headers=headers)
     wanted = _range(request, sha256, size)
     path = await to_thread.run_sync(service.storage.blobs.path, sha256)
@@ -88,12 +89,6 @@ def _headers(sha256: str) -> dict[str, str]:
         "Cache-Control": "private, max-age=31536000, immutable",
         "Content-Disposition": "attachment",
     }
-
-
-def _matches(header: str | None, sha256: str) -> bool:
-    """Whether `If-None-Match` names the file; weak comparison, as RFC 9110 has it for this header."""
-    tags = [tag.strip().removeprefix("W/") for tag in (header or "").split(",")]
-    return "*" in tags or f'"{sha256}"' in tags
 
 
 def _range(request: Request, sha256: str, size: int) -> tuple[int, int] | None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import hashlib
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Depends, Request, Response
 
 from schemas.problem import ExitCode, Problem
 from schemas.service import ModelRecord, VersionRecord
 from services.api.answers import AliasesRecord, ModelPage, Move, Reasoned, SigningKeys, VersionPage
 from services.api.body import JsonBody
+from services.api.etags import is_current
 from services.api.pages import LINK_HEADER, Page
 from services.api.parts import AliasPath, NamePath, Services, VersionPath
 from services.api.security import Caller, Needs
@@ -17,6 +19,18 @@ from services.service import Service
 
 router = APIRouter(prefix="/v1", tags=["models"])
 _publish = [Depends(Needs("publish"))]
+_ETAG: dict[str, Any] = {"ETag": {"description": "Changes with the record.", "schema": {"type": "string"}}}
+_IF_NONE_MATCH: dict[str, Any] = {
+    "parameters": [
+        {
+            "name": "If-None-Match",
+            "in": "header",
+            "required": False,
+            "schema": {"type": "string"},
+            "description": "ETags of records that the client has.",
+        }
+    ]
+}
 
 
 @router.get("/models", responses={200: {"headers": LINK_HEADER}})
@@ -39,10 +53,20 @@ def list_versions(name: NamePath, service: Services, paging: Page) -> VersionPag
     return VersionPage(items=service.registry.records(name, publications))
 
 
-@router.get("/models/{name}/versions/{version}")
-def read_version(name: NamePath, version: VersionPath, service: Services) -> VersionRecord:
-    """A version, by number or alias."""
-    return service.registry.record(service.registry.resolve(f"{name}@{version}"))
+@router.get(
+    "/models/{name}/versions/{version}",
+    response_model=VersionRecord,
+    responses={200: {"headers": _ETAG}, 304: {"description": "The client has it.", "headers": _ETAG}},
+    openapi_extra=_IF_NONE_MATCH,
+)
+def read_version(name: NamePath, version: VersionPath, request: Request, service: Services) -> Response:
+    """A version, by number or alias. Its ETag lets clients ask often whether an alias has moved."""
+    content = service.registry.record(service.registry.resolve(f"{name}@{version}")).model_dump_json().encode()
+    tag = hashlib.sha256(content).hexdigest()
+    headers = {"ETag": f'"{tag}"'}
+    if is_current(request.headers.get("if-none-match"), tag):
+        return Response(status_code=304, headers=headers)
+    return Response(content, media_type="application/json", headers=headers)
 
 
 @router.get("/models/{name}/aliases")

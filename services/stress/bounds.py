@@ -58,6 +58,14 @@ BOUNDS: Final[dict[str, Bound]] = {
     "composite": Bound(
         1e-7, "absolute", 1e-6, "Linear colours in [0, 1], and up to 2 for the tail `paper`, rounded to float32 once."
     ),
+    "exponents": Bound(
+        1e-11,
+        "relative",
+        1.0,
+        "Optical depths in front of fragments, as the depth bins of `density-16` and `density-8` tell them, up to the "
+        "60 where weights end. The operations are the same, in float64; should a compiler fuse some, each is a "
+        "rounding of `D`, at most 22,700 x 2^-53 = 2.5e-12 for 4096 fragments of 254/255.",
+    ),
     "csr": Bound(0.0, "absolute", 1.0, "Sorting moves bits: fragments in another place than a stable sort puts them."),
     "hull": Bound(
         1e-12,
@@ -145,6 +153,13 @@ BOUNDS: Final[dict[str, Bound]] = {
         1.0,
         "Standard deviations, `sqrt(E[x^2] - E[x]^2)`: where values are nearly equal the difference is the rounding "
         "of both, and the root makes 4e-4 of 2^-24 and more. The weakest bound here.",
+    ),
+    "features.front": Bound(
+        0.0,
+        "absolute",
+        1.0,
+        "`front_1` to `front_15`: shares of the optical depth in front of depth bins that are another fifteenth than "
+        "in integer arithmetic. Bins are found by float32 operations that are the same everywhere, and count integers.",
     ),
     "features.float16": Bound(
         INFORMATION,

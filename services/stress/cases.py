@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.fragments import FragmentDump
+from schemas.tail import ROOT_SHARE
 
 LONGEST: Final = 4096
 """Fragments of the longest list."""
@@ -127,7 +128,30 @@ def curve_cases(quick: bool, seed: int) -> list[Case]:
     ]
     for name, alpha in (("1/255", 1), *(() if quick else ((".5", 128), ("254/255", 254), ("0 to 1", None)))):
         cases.append(Case(f"alpha {name}, n {LONGEST}", dump_of([some_list(rng, LONGEST, alpha)])))
-    return cases + found_cases()
+    return cases + bin_cases() + found_cases()
+
+
+def bin_cases() -> list[Case]:
+    """What is hard for the depth bins of the binned density tails, 8 and 16: their edges, ties of shares, full bins."""
+    edge = np.arange(17) / 16.0
+    # x of `y = (1 - r) x + r sqrt(x)`, by the quadratic formula in sqrt(x).
+    x = ((np.sqrt(ROOT_SHARE**2 + 4.0 * (1.0 - ROOT_SHARE) * edge) - ROOT_SHARE) / (2.0 * (1.0 - ROOT_SHARE))) ** 2
+    edges = np.add.outer(np.arange(-2, 3) * 2.0**-23, 1.0 + x).clip(1.0, 2.0).ravel()
+    # One of 30 equal fragments in front: a share of 1/30, as near to 0 as to 1/15; so with all odd numbers of them.
+    ties = [np.where(np.arange(30) < ahead, 1.0, 2.0) for ahead in range(1, 30, 2)]
+    full = [np.where(np.arange(64) < ahead, 1.0, 2.0) for ahead in (0, 13, 32, 51, 64)]
+    return [
+        Case("depths at the edges of bins, n 85", dump_of([_equal(edges, level) for level in (1, 128, 254)])),
+        Case("shares halfway between two steps, n 30", dump_of([_equal(depth, 128) for depth in ties])),
+        Case("more than a bin holds, n 64", dump_of([_equal(depth, 254) for depth in full])),
+    ]
+
+
+def _equal(depth: NDArray[np.float64], alpha: int) -> List:
+    """Fragments of one alpha, each of another colour."""
+    rgba = np.full((len(depth), 4), alpha, np.uint8)
+    rgba[:, :3] = (np.arange(3 * len(depth)) * 37 % 256).reshape(-1, 3)
+    return rgba, depth.astype(np.float32)
 
 
 def _grey(level: int, n: int, rng: np.random.Generator) -> List:

@@ -40,6 +40,9 @@ def run(options: Options) -> Iterator[Finding]:
         found = [(f, solve_on_lattice(curves, n, f).k) for f in edge_budgets(n)]
         limits.append(_limits(f"gains {name} on the lattice", n, found))
         yield _order_of_gains("fill.lattice", name, n, a, b, found)
+    for name, (a, b) in overflow_cases(rng, pixels).items():
+        found = [(f, solve_on_lattice(curves_of(a, b), n, f).k) for f in edge_budgets(n)]
+        limits.append(_limits(f"gains {name} on the lattice", n, found))
     yield worst_of(limits, f"{len(limits)} inputs, every F")
     yield from _sums(rng, 100_000 if options.quick else 10_000_000)
 
@@ -69,6 +72,19 @@ def gain_cases(rng: np.random.Generator, pixels: int) -> dict[str, tuple[Numbers
         "huge a": (rng.choice([-1e30, 1e30], pixels), rng.uniform(0.02, 2.0, pixels)),
         "huge b": (rng.normal(-8.0, 3.0, pixels), rng.choice([0.02, 1e30], pixels)),
         "1 ulp apart": (-8.0 + rng.integers(0, 3, pixels) * 2.0**-20, np.full(pixels, 0.25)),
+    }
+    return {name: (a.astype(np.float32), b.astype(np.float32)) for name, (a, b) in cases.items()}
+
+
+def overflow_cases(rng: np.random.Generator, pixels: int) -> dict[str, tuple[Numbers, Numbers]]:
+    """What a network that overflows may answer, float32 [P] each; a frame cannot refuse it."""
+    a, b = rng.normal(-8.0, 3.0, pixels), rng.uniform(0.02, 2.0, pixels)
+    bad = rng.choice([np.nan, np.inf, -np.inf, 0.0], pixels)
+    cases = {
+        "all NaN": (np.full(pixels, np.nan), np.full(pixels, np.nan)),
+        "a NaN or infinite": (np.where(bad == 0.0, a, bad), b),
+        "b NaN or infinite": (a, np.where(bad == 0.0, b, np.abs(bad))),
+        "both": (np.where(bad == 0.0, a, bad), np.where(rng.random(pixels) < 0.5, b, np.abs(bad + 0.02))),
     }
     return {name: (a.astype(np.float32), b.astype(np.float32)) for name, (a, b) in cases.items()}
 
@@ -157,8 +173,8 @@ def _float32_sum(values: Numbers) -> np.float32:
 def _fill_in_any_order(rng: np.random.Generator, count: int) -> Iterator[Finding]:
     n = rng.integers(0, 9, count).astype(np.int32)
     budget = int(0.4 * n.sum())
-    # Different weights, so that no tie is decided by the index.
-    weights = rng.permutation(np.linspace(0.1, 1.0, count))
+    # Weights without a pattern: no two pixels have fragments at the same scale, a tie that the index would decide.
+    weights = rng.uniform(0.1, 1.0, count)
     plain = budget_fill(weights, n, budget, 1)
     for name, order in (("reversed", np.arange(count)[::-1]), ("shuffled", rng.permutation(count))):
         moved = np.empty_like(plain)

@@ -13,7 +13,7 @@ from renderer.allocation.gpu import BLOCK, GpuAllocation
 from renderer.allocation.lattice import Curves, curves_of, solve_on_lattice
 from renderer.programs import Programs
 from services.stress.allocations import edge_budgets
-from services.stress.fills import gain_cases
+from services.stress.fills import gain_cases, overflow_cases
 from services.stress.findings import Finding, Options, compared
 from services.stress.gl_bounds import bound_of
 
@@ -32,7 +32,7 @@ def rows(ctx: moderngl.Context, options: Options, driver: str) -> Iterator[Findi
     pixels = BLOCK + 100 if options.quick else 20 * BLOCK + 100
     n = np.where(rng.random(pixels) < 0.02, 4096, rng.integers(0, 7, pixels)).astype(np.int32)
     bound, programs, allocation = bound_of(PATH, deep=False), Programs(ctx), GpuAllocation(ctx)
-    for name, (a, b) in gain_cases(rng, pixels).items():
+    for name, (a, b) in (gain_cases(rng, pixels) | overflow_cases(rng, pixels)).items():
         curves = curves_of(a, b)
         for budget in edge_budgets(n):
             found = _allotted(ctx, programs, allocation, curves, n, budget)

@@ -57,7 +57,8 @@ BOUNDS: Final[dict[str, Bound]] = {
     "bounded": _picture(
         4e-6,
         "Core as the exact ones; the tail's `P = exp(-D)` with `D = sum -ln(1-a)`: `1 - a` loses 2^-25, which is "
-        "7.6e-6 of `-ln(1 - 1/255)`, the same in every term, and `D exp(-D) <= .37`. `paper` has light up to 2.",
+        "7.6e-6 of `-ln(1 - 1/255)`, the same in every term, and `D exp(-D) <= .37`. The binned tails have it of the "
+        "whole list: `T_core P = exp(-D)`. `paper` has light up to 2.",
     ),
     "bounded.limits": Bound(
         0.0,
@@ -102,6 +103,23 @@ BOUNDS: Final[dict[str, Bound]] = {
         1e-3,
         "Sums by blending in float32: up to 100 roundings, and those of `-ln(1-a)` as in the tails.",
     ),
+    "gather.half": Bound(
+        2.0**-10,
+        "relative",
+        1e-3,
+        "Sums in half floats, as they are beside depth bins, over n + 2: what is there and what is added is cut to "
+        "11 bits by each addition.",
+    ),
+    "bins.optical depth": Bound(
+        1.5e-5, "relative", 1e-3, "The optical depth beside depth bins, in float32, as in `gather`."
+    ),
+    "bins.shares": Bound(
+        0.0,
+        "absolute",
+        1.0,
+        "Fifteenths by which what is kept of 8 and 16 depth bins differs from integer arithmetic: places are rounded "
+        "operation by operation, bins add whole units and stop at 65,535.",
+    ),
     "features": Bound(8e-6, "relative", 1.0, "Features in GLSL of those sums, but the spreads."),
     "features.spread": Bound(
         1e-3,
@@ -109,6 +127,23 @@ BOUNDS: Final[dict[str, Bound]] = {
         1.0,
         "Standard deviations: `sqrt(E[x^2] - E[x]^2)` cancels where values are nearly equal, and the root turns 1e-6 "
         "into 1e-3.",
+    ),
+    "features.front": Bound(
+        0.0, "absolute", 1.0, "`front_1` to `front_15`, in fifteenths: the kept shares as they are."
+    ),
+    "features.half": Bound(
+        3.0 * 2.0**-10,
+        "relative",
+        1.0,
+        "Features of half-float sums, over n + 2: a mean has the error of one sum, a mean weighted by alpha of two, a "
+        "covariance of three.",
+    ),
+    "features.half spread": Bound(
+        0.055,
+        "absolute",
+        1.0,
+        "Standard deviations of half-float sums, over `sqrt(n + 2)`: the variance has the error of `E[x^2]` and twice "
+        "that of `E[x]`, and where it should be 0 the root of that is all there is: `sqrt(3 x 2^-10)`.",
     ),
     "predict.glsl": Bound(
         1e-5, "relative", 1.0, "The network in GLSL on the same float32 features: dot products of a few dozen terms."
@@ -133,7 +168,9 @@ DEEP: Final[dict[str, Bound]] = {
     "sbuffer": _ORDERED_DEEP,
     "multilayer": _ORDERED_DEEP,
     "bounded": _picture(
-        2.5e-5, "As above; with F = 0 all 4096 fragments are in the tail's sums, which is as `weighted-average` has it."
+        2.5e-5,
+        "As above; with F = 0 all 4096 fragments are in the tail's sums, which is as `weighted-average` has it. The "
+        "exponents of binned tails, up to 60, are rounded three times: `180 x 2^-24 = 1.1e-5` of a weight.",
     ),
     "weighted-average": _picture(
         2.5e-5, "Sums of 4096 equal terms round in one direction for long: up to `n / 2 2^-24 = 1.2e-4` of them."
@@ -141,6 +178,24 @@ DEEP: Final[dict[str, Bound]] = {
     "weighted-blended": _picture(1e-5, "The same; weights differ, so that roundings cancel."),
     "stochastic": _picture(1e-5, "Sums of 4096 terms."),
     "gather": Bound(1e-4, "relative", 1e-3, "Sums of 4096 terms."),
+    "gather.half": Bound(
+        2e-4,
+        "relative",
+        1e-3,
+        "Half floats stall: where a sum is 1024 times what is added, nothing may be, and from 512 times on half of it "
+        "may be lost. So up to `n 2^-10 / (1 + n 2^-10) = 4/5` of a sum is lost at n = 4096, over n + 2: 1.95e-4.",
+    ),
+    "bins.optical depth": Bound(1e-4, "relative", 1e-3, "Sums of 4096 terms, as in `gather`."),
+    "features.half": Bound(
+        1e-3,
+        "relative",
+        1.0,
+        "Features of sums of which up to 4/5 is lost: a mean is too small by that, a mean weighted by alpha may be "
+        "five times as large, over n + 2.",
+    ),
+    "features.half spread": Bound(
+        0.016, "absolute", 1.0, "Nothing is left of a spread but that it is at most 1, over `sqrt(n + 2)`."
+    ),
     "features": Bound(5e-5, "relative", 1.0, "Features of sums of 4096 terms."),
 }
 """The same for 4096 fragments a pixel, where that differs."""

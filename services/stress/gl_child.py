@@ -28,7 +28,6 @@ from services.stress.findings import Broken, Finding, NotRun, Options, Row
 from services.stress.gl_cases import Scenery, make_case, sceneries
 from services.stress.gl_drivers import DRIVERS, Driver
 from services.stress.predictors import networks, real_features
-from trainer.weights import Weights
 
 KINDS: dict[str, type[Row]] = {kind.__name__: kind for kind in (Finding, NotRun, Broken)}
 """Rows by the name that a line gives."""
@@ -57,9 +56,9 @@ class Suite:
         found: dict[bool, list[Row]] = {False: [], True: []}
         with tempfile.TemporaryDirectory() as folder:
             weights = next(iter(self._networks.values()))
-            bundle = gl_network.random_bundle(Path(folder), weights, describe(self._ctx))
+            networks = gl_network.random_networks(Path(folder), weights, describe(self._ctx))
             for scenery in sceneries(self._options):
-                found[scenery.deep] += self._scenery(scenery, weights, bundle)
+                found[scenery.deep] += self._scenery(scenery, networks)
         yield from worst_rows(found[False])
         yield from worst_rows(found[True])
         adverse = partial(gl_network.feature_rows, self._ctx, self._options, self._networks, self._real, self._driver)
@@ -69,7 +68,7 @@ class Suite:
         curves = partial(gl_allocation.rows, self._ctx, self._options, self._driver)
         yield from worst_rows(self._step("allocation", "gain curves", curves))
 
-    def _scenery(self, scenery: Scenery, weights: Weights, bundle: Path) -> Iterator[Row]:
+    def _scenery(self, scenery: Scenery, networks: gl_network.Networks) -> Iterator[Row]:
         self._say({"at": f"upload, {scenery.name}"})
         try:
             case = make_case(self._ctx, scenery, self._programs)
@@ -78,9 +77,9 @@ class Suite:
             return
         self._say({"digest": gl_capture.digest(case.dump), "case": scenery.name})
         yield from self._step("capture", scenery.name, partial(gl_capture.rows, case, self._driver))
-        network = partial(gl_network.rows, case, weights, bundle, self._driver)
+        network = partial(gl_network.rows, case, networks, self._driver)
         yield from self._step("network", scenery.name, network)
-        for name, work in gl_techniques.steps(case, self._options, self._driver, bundle):
+        for name, work in gl_techniques.steps(case, self._options, self._driver, networks):
             yield from self._step(name, scenery.name, work)
 
     def _step(self, name: str, case: str, work: Callable[[], Iterator[Finding]]) -> Iterator[Row]:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from renderer.techniques import (
     TECHNIQUES,
     Budget,
     KBuffer,
+    KBufferDeep,
     KBufferDynamic,
     KBufferOptimal,
     Moment,
@@ -25,17 +25,34 @@ from renderer.techniques import (
 )
 from renderer.techniques.base import ChainForm
 from renderer.techniques.chain import one_pass_available
-from schemas.tail import TAILS
+from schemas.tail import DEFAULT_TAIL, TAILS, TailName
 from services.stress.findings import Finding, Options, compared
 from services.stress.gl_bounds import bound_of
 from services.stress.gl_cases import Case
 from services.stress.gl_moment import DELICATE
+from services.stress.gl_network import Networks
 from services.stress.gl_stacks import ILL_CONDITIONED
 from services.stress.gl_twins import Truth, Unbounded, unbounded
 
 BOUNDED = tuple(name for name, entry in TECHNIQUES.items() if entry.family == "bounded")
 _WHOLE = tuple(name for name in BOUNDED if name not in (KBuffer.name, KBufferDynamic.name))
 """Those that give every fragment of their budget away."""
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """One way to render a technique with a budget.
+
+    Attributes:
+        path: As in the table.
+        tails: That are tried.
+        chain: How its chain is drawn.
+    """
+
+    path: str
+    tails: tuple[TailName, ...] = TAILS
+    chain: ChainForm = "auto"
+
 
 BUDGETS: Mapping[str, Callable[[int, int], int]] = {
     "0": lambda total, occupied: 0,
@@ -59,7 +76,7 @@ def random_allocation(frame: Frame, budget: Budget) -> NDArray[np.int32]:
 
 
 def steps(
-    case: Case, options: Options, driver: str, bundle: Path
+    case: Case, options: Options, driver: str, networks: Networks
 ) -> Iterator[tuple[str, Callable[[], Iterator[Finding]]]]:
     """All techniques on a case, each with its name, rendered when called.
 
@@ -67,18 +84,24 @@ def steps(
         case: What is rendered.
         options: Quick runs leave out some parameters.
         driver: For the paths.
-        bundle: What `kbuffer-deep` predicts with.
+        networks: What `kbuffer-deep` predicts with.
     """
     truth = Truth.of(case)
     for each in unbounded(options):
         if not (case.scenery.deep and each.peeled):
             yield each.name, partial(picture_rows, case, truth, each, driver)
-    needs = Needs(bundle=bundle, allocate=random_allocation)
+    needs = Needs(bundle=networks.plain, allocate=random_allocation)
     for name in BOUNDED:
         yield name, partial(bounded_rows, case, truth, name, needs, driver)
+    for suffix, bundle, tail in (
+        ("binned sums", networks.binned, DEFAULT_TAIL),
+        ("overflowing network", networks.overflowing, "density"),
+    ):
+        form = Form(f"{KBufferDeep.name}.{suffix}", (tail,))
+        yield form.path, partial(bounded_rows, case, truth, KBufferDeep.name, Needs(bundle=bundle), driver, form)
     if one_pass_available(case.frame.ctx):  # the others have taken it
-        name = KBufferOptimal.name
-        yield f"{name}.two-pass", partial(bounded_rows, case, truth, name, needs, driver, "two-pass")
+        form = Form(f"{KBufferOptimal.name}.two-pass", chain="two-pass")
+        yield form.path, partial(bounded_rows, case, truth, KBufferOptimal.name, needs, driver, form)
 
 
 def picture_rows(case: Case, truth: Truth, each: Unbounded, driver: str) -> Iterator[Finding]:
@@ -98,25 +121,24 @@ def picture_rows(case: Case, truth: Truth, each: Unbounded, driver: str) -> Iter
 
 
 def bounded_rows(
-    case: Case, truth: Truth, name: str, needs: Needs, driver: str, chain: ChainForm = "auto"
+    case: Case, truth: Truth, name: str, needs: Needs, driver: str, form: Form | None = None
 ) -> Iterator[Finding]:
     """A technique with a budget: every tail, then whether budgets and k were kept."""
-    made = technique(name, needs)
-    path = name if chain == "auto" else f"{name}.{chain}"
+    made, form = technique(name, needs), form or Form(name)
     wrong: list[str] = []
     occupied = int(np.count_nonzero(case.dump.counts))
-    for tail in TAILS:
+    for tail in form.tails:
         for label in case.scenery.budgets:
             fragments = BUDGETS[label](case.dump.total, occupied)
-            rendered = made.render(case.frame, Budget(fragments, tail, chain=chain))
+            rendered = made.render(case.frame, Budget(fragments, tail, chain=form.chain))
             wrong += [f"F = {label}, {tail}: {why}" for why in broken_limits(name, rendered, case, fragments)]
             linear, expected = rendered.linear.reshape(-1, 3), truth.hybrid(rendered.k, tail)
-            row = _compared(case, f"{path}.{tail} · {driver}", case.pixels, linear, expected, "bounded")
+            row = _compared(case, f"{form.path}.{tail} · {driver}", case.pixels, linear, expected, "bounded")
             yield replace(row, where=f"F = {label}, {row.where}")
     count = float(len(wrong))
     bound = bound_of("bounded.limits", deep=False)
     where = f"{case.scenery.name}: {wrong[0]}" if wrong else "nowhere"
-    yield Finding(f"{path}.F, K and k_min · {driver}", case.name, count, count, where, bound.value, bound.measure)
+    yield Finding(f"{form.path}.F, K and k_min · {driver}", case.name, count, count, where, bound.value, bound.measure)
 
 
 def broken_limits(name: str, rendered: Rendered, case: Case, fragments: int) -> list[str]:

@@ -121,7 +121,7 @@ def _colours(rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.int
 def worst_features(
     seed: int, climb: int, weights: Weights, real: NDArray[np.float32], predict: Predict
 ) -> NDArray[np.float32]:
-    """float32 [128, 26], the batch of one climb in which a row was worst, within the clamp of a network's inputs.
+    """float32 [128, 41], the batch of one climb in which a row was worst, within the clamp of a network's inputs.
 
     A whole batch, because what a library answers to a row can depend on those beside it.
 
@@ -129,7 +129,7 @@ def worst_features(
         seed: Of the search.
         climb: Which.
         weights: The network.
-        real: float32 [R, 26], features of pixels to start from.
+        real: float32 [R, 41], features of pixels to start from.
         predict: The form that is compared with float64.
     """
     rng = np.random.default_rng([seed, climb])

@@ -8,12 +8,12 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from labeller.reference import Pixel, binned_exponents
+from labeller.reference import Pixel, binned_exponents, depth_bins
 from renderer.depth_bins import MOST_BINS
 from renderer.features import FEATURES, SUMS
 from schemas.bundle import FEATURE_LIMIT, GAIN_FLOOR
 from schemas.fragments import FragmentDump
-from schemas.tail import DENSITY_BINS, MAX_EXPONENT, TailName
+from schemas.tail import DENSITY_BINS, MAX_EXPONENT, SHARE_LEVELS, TailName
 
 Extended = NDArray[np.longdouble]
 
@@ -80,8 +80,16 @@ def exact_hull(error: NDArray[np.float32], k_min: int) -> list[Fraction]:
     return hull
 
 
-def sums64(dump: FragmentDump) -> NDArray[np.float64]:
-    """The raw sums of every pixel, float64 [P, 44], columns `renderer.features.SUMS`, each as its definition reads."""
+def sums64(dump: FragmentDump, bins: int = 0) -> NDArray[np.float64]:
+    """The raw sums of every pixel, each as its definition reads.
+
+    Args:
+        dump: Fragments of a view.
+        bins: Depth bins of the tail; 0: it has none.
+
+    Returns:
+        float64 [P, 44], columns `renderer.features.SUMS`.
+    """
     out = np.zeros((dump.pixels, len(SUMS)))
     for p in range(dump.pixels):
         part = slice(dump.offsets[p], dump.offsets[p + 1])
@@ -111,6 +119,10 @@ def sums64(dump: FragmentDump) -> NDArray[np.float64]:
                 f"nearest_{c}": rgb[0, i],
                 f"background_{c}": dump.background[p, i] / 255.0,
             }
+        if bins:
+            optical = -np.log(np.maximum(1.0 - alpha, 1e-3))
+            shares = depth_bins(depth, optical, bins)[1] / SHARE_LEVELS
+            columns |= {f"front_{MOST_BINS // bins * b}": shares[b] for b in range(1, bins)}
         for name, value in columns.items():
             out[p, SUMS.index(name)] = value
     return out

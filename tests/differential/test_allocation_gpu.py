@@ -14,7 +14,7 @@ from renderer.allocation.gpu import BLOCK, STATE, FrameAllocation, GpuAllocation
 from renderer.allocation.lattice import LAST, MOST_FRAGMENTS, Curves, curves_of, solve_on_lattice
 from renderer.programs import Programs
 from services.stress.allocations import edge_budgets
-from services.stress.fills import gain_cases
+from services.stress.fills import gain_cases, overflow_cases
 
 
 @dataclass
@@ -65,12 +65,16 @@ def test_counts_equal_the_twins_for_every_size(bench: Bench, ctx: moderngl.Conte
         assert state.complete or state.index == expected.index
 
 
-@pytest.mark.parametrize("name", list(gain_cases(np.random.default_rng(0), 1)))
+def every_case(rng: np.random.Generator, pixels: int) -> dict[str, tuple[NDArray[np.float32], NDArray[np.float32]]]:
+    return gain_cases(rng, pixels) | overflow_cases(rng, pixels)
+
+
+@pytest.mark.parametrize("name", list(every_case(np.random.default_rng(0), 1)))
 def test_curves_of_all_kinds_give_the_twins_counts(bench: Bench, ctx: moderngl.Context, name: str) -> None:
     rng = np.random.default_rng(5)
     pixels = 3000
     n, _ = usual(rng, pixels)
-    curves = curves_of(*gain_cases(rng, pixels)[name])
+    curves = curves_of(*every_case(rng, pixels)[name])
     for budget in edge_budgets(n.astype(np.int32)):
         k, _ = bench.solve(GpuAllocation(ctx), curves, n, budget)
         assert np.array_equal(k, solve_on_lattice(curves, n, budget).k)

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
 import pytest
 
 from labeller.curves import error_curves
-from renderer.features import FEATURES, derive, gather
+from renderer.depth_bins import place_of, units_in_front
+from renderer.features import FEATURES, SUMS, derive, gather
+from schemas.tail import BIN_LIMIT, DENSITY_BINS, SHARE_LEVELS
+from services.stress import curves, features
 from services.stress.bounds import BOUNDS
-from services.stress.cases import curve_cases, dump_of, some_list
+from services.stress.cases import bin_cases, curve_cases, dump_of, some_list
 from services.stress.findings import Finding, Options, Row
 from services.stress.suites import Listed, rows_of
 from services.stress.twins import features64, network64, sums64
@@ -37,11 +40,11 @@ def refused(found: Sequence[Row]) -> list[Row]:
     [
         (
             "curves",
-            {"curves", "curves.weights", "curves.by_g", "composite", "reference", "transmittance", "csr"}
+            {"curves", "curves.weights", "curves.by_g", "exponents", "composite", "reference", "transmittance", "csr"}
             | {"transmittance.float32", "transmittance.rejected"},
         ),
         ("fills", {"fill.limits", "fill.budget", "fill.lambda", "fill.lattice", "fill.order", "sum", "sum.rejected"}),
-        ("features", {"features.gather", "features.derive", "features.spread"}),
+        ("features", {"features.gather", "features.derive", "features.spread", "features.front"}),
     ],
 )
 def test_every_path_of_a_suite_is_within_its_bound(name: str, paths: set[str]) -> None:
@@ -66,6 +69,43 @@ def test_the_cases_are_what_method_section_6_names() -> None:
     for dump in cases.values():
         keys = np.lexsort((dump.rgba.view("<u4")[:, 0], dump.depth, np.repeat(np.arange(dump.pixels), dump.counts)))
         assert (keys == np.arange(dump.total)).all(), "front to back, ties by colour"
+
+
+def test_hard_lists_of_depth_bins_are_what_their_names_say() -> None:
+    edges, ties, full = (case.dump for case in bin_cases())
+    for bins in DENSITY_BINS.values():
+        depth = edges.depth[:85]
+        place = [float(place_of(z, depth[0], depth[-1] - depth[0], bins)) for z in depth]
+        inner = [sum(abs(y - b) < 1e-4 for y in place) for b in range(1, bins)]
+        assert min(inner) >= 4, "1 ulp before, at and behind every edge"
+        assert {int(y) for y in place} == set(range(bins + 1))
+    shares = gather(ties, 8)[:, SUMS.index("front_8")] * SHARE_LEVELS
+    ahead = np.arange(1, 30, 2)
+    np.testing.assert_array_equal(np.rint(shares), (ahead + 1) // 2)  # of `ahead` thirtieths, up
+    front = np.empty(9)
+    units_in_front(full.depth[:64], full.rgba[:64], front)
+    assert front[-1] == BIN_LIMIT
+
+
+@pytest.mark.parametrize(
+    ("name", "broken", "path"),
+    [
+        ("gather", lambda dump, bins=0: gather(dump, bins) * np.float32(1.2), "features.front"),
+        ("binned_exponents", lambda depth, rgba, optical, front, out: out.fill(0.5), "exponents"),
+    ],
+)
+def test_other_accounts_of_depth_bins_are_violations__name(
+    monkeypatch: pytest.MonkeyPatch, name: str, broken: Callable[..., object], path: str
+) -> None:
+    module = features if path == "features.front" else curves
+    monkeypatch.setattr(module, name, broken)
+    case = bin_cases()[0]
+    found = [
+        features._fronts(case, bins) if path == "features.front" else curves._exponents(case, tail)
+        for tail, bins in DENSITY_BINS.items()
+    ]
+    assert [(row.path, row.ok) for row in found] == [(path, False)] * 2
+    assert "pixel" in found[0].where
 
 
 def test_the_rejected_formula_is_as_bad_as_told_and_the_one_in_use_is_not() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import moderngl
 import numpy as np
@@ -14,7 +13,7 @@ from labeller import reference
 from renderer import programs
 from renderer.programs import Programs
 from renderer.reference import moment
-from renderer.techniques import TECHNIQUES, Budget, KBuffer, KBufferDynamic, KBufferOptimal, Needs
+from renderer.techniques import TECHNIQUES, Budget, KBuffer, KBufferDeep, KBufferDynamic, KBufferOptimal, Needs
 from renderer.techniques.ordered import Ordered, capture_ordered
 from services.stress import gl, gl_bounds, gl_capture, gl_child, gl_moment, gl_network, gl_refused, gl_techniques
 from services.stress.findings import Broken, Finding, Options
@@ -30,6 +29,12 @@ CASES = {scenery.name: scenery for scenery in sceneries(QUICK)}
 @pytest.fixture(scope="module")
 def shared(gl: moderngl.Context) -> Programs:
     return Programs(gl)
+
+
+@pytest.fixture(scope="module")
+def made(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> gl_network.Networks:
+    weights = next(iter(networks(0, real_features(np.random.default_rng(0), 50)).values()))
+    return gl_network.random_networks(tmp_path_factory.mktemp("networks"), weights, "here")
 
 
 def replaced(patch: pytest.MonkeyPatch, file: str, old: str, new: str) -> None:
@@ -51,15 +56,13 @@ def chain(case: Case) -> list[Finding]:
 
 @pytest.mark.parametrize("name", ["alpha 0 and 1", "slanted triangles", "lengths of 1e-30 m"])
 def test_a_sound_renderer_is_within_its_bounds(
-    gl: moderngl.Context, shared: Programs, tmp_path: Path, name: str
+    gl: moderngl.Context, shared: Programs, made: gl_network.Networks, name: str
 ) -> None:
     case = make_case(gl, CASES[name], shared)
-    weights = next(iter(networks(0, real_features(np.random.default_rng(0), 50)).values()))
-    bundle = gl_network.random_bundle(tmp_path, weights, "here")
     rows = [
         *gl_capture.rows(case, "here"),
-        *gl_network.rows(case, weights, bundle, "here"),
-        *(row for _, work in gl_techniques.steps(case, QUICK, "here", bundle) for row in work()),
+        *gl_network.rows(case, made, "here"),
+        *(row for _, work in gl_techniques.steps(case, QUICK, "here", made) for row in work()),
     ]
     assert [row for row in rows if not row.ok] == []
     assert any(row.absolute > 0.0 for row in rows), "nothing was compared"
@@ -99,6 +102,68 @@ def test_a_broken_tail_is_a_violation_and_named(gl: moderngl.Context, monkeypatc
     wrong = {row.path for row in rows if not row.ok}
     assert wrong == {"kbuffer-optimal.density · here", "kbuffer-optimal.exact-coverage · here"}
     assert all("F = " in row.where and "pixel" in row.where for row in rows if not row.ok)
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "paths"),
+    [
+        ("gather/pack.comp", "front[b] + total)", "front[b] + total / 2u)", {"bins.shares", "features.front"}),
+        (
+            "gather/gather.frag",
+            "int(bin_place(v_depth, nearest, extent))",
+            "int(0.9 * bin_place(v_depth, nearest, extent))",
+            {"bins.shares", "features.front"},
+        ),
+        (
+            "gather/gather.frag",
+            "binned_depth = optical_depth",
+            "binned_depth = 1.001 * optical_depth",
+            {"bins.optical depth"},
+        ),
+        ("kbuffer-deep/inputs.glsl", "const int every = 16", "const int every = 32", {"features.front"}),
+        (
+            "gather/gather.frag",
+            "vec4(1.0, a, a * a, optical_depth)",
+            "vec4(1.0, 0.5 * a, a * a, optical_depth)",
+            {"gather", "gather.half", "features", "features.half", "features.spread"},
+        ),
+        (
+            "gather/gather.frag",
+            "vec4(rgb * rgb, 0.0)",
+            "vec4(9.0 * rgb * rgb, 0.0)",
+            {"gather", "gather.half", "features.spread", "features.half spread"},
+        ),
+    ],
+)
+def test_a_broken_gather_pass_is_a_violation_and_named(
+    gl: moderngl.Context,
+    made: gl_network.Networks,
+    monkeypatch: pytest.MonkeyPatch,
+    file: str,
+    old: str,
+    new: str,
+    paths: set[str],
+) -> None:
+    replaced(monkeypatch, file, old, new)
+    case = make_case(gl, CASES["far / near of 1e7"], Programs(gl))
+    wrong = {row.path.split(" · ")[0] for row in gl_network.rows(case, made, "here") if not row.ok}
+    assert wrong >= paths
+
+
+def test_curves_that_stay_nan_are_a_violation(
+    gl: moderngl.Context, made: gl_network.Networks, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = make_case(gl, CASES["alpha 0 and 1"], Programs(gl))
+    deep, needs = KBufferDeep, Needs(bundle=made.overflowing)
+    answers = deep(made.overflowing).predict(case.frame, np.flatnonzero(case.dump.counts).astype(np.uint32))
+    assert np.isnan(answers).any()
+    form = gl_techniques.Form("overflowing", ("density",))
+    truth = Truth.of(case)
+    assert all(row.ok for row in gl_techniques.bounded_rows(case, truth, deep.name, needs, "here", form))
+    replaced(monkeypatch, "kbuffer-deep/curves.comp", "is_nan ? least", "is_nan ? x")
+    case = make_case(gl, CASES["alpha 0 and 1"], Programs(gl))
+    rows = gl_techniques.bounded_rows(case, truth, deep.name, needs, "here", form)
+    assert [row.path for row in rows if not row.ok] == ["overflowing.F, K and k_min · here"]
 
 
 def test_a_picture_that_is_not_finite_is_a_violation(gl: moderngl.Context, monkeypatch: pytest.MonkeyPatch) -> None:

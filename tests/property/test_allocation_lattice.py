@@ -19,6 +19,7 @@ from renderer.allocation.lattice import (
     fragments_at,
     price,
     solve_on_lattice,
+    within_limits,
 )
 from renderer.screen import TURNS
 from schemas.bundle import GAIN_FLOOR
@@ -26,8 +27,9 @@ from schemas.bundle import GAIN_FLOOR
 pytestmark = pytest.mark.usefixtures("single_thread")
 
 counts = st.lists(st.one_of(st.integers(0, 6), st.sampled_from([0, 1, 4096])), min_size=1, max_size=12)
-gain = st.one_of(st.sampled_from([0.0, -5.0, -1e30, 1e30]), st.floats(-200.0, 200.0, width=32))
-decay = st.one_of(st.sampled_from([0.5, GAIN_FLOOR, 1e30]), st.floats(0.03125, 300.0, width=32))
+NAN, INF = float("nan"), float("inf")
+gain = st.one_of(st.sampled_from([0.0, -5.0, -1e30, 1e30, NAN, INF, -INF]), st.floats(-200.0, 200.0, width=32))
+decay = st.one_of(st.sampled_from([0.5, GAIN_FLOOR, 1e30, NAN, INF]), st.floats(0.03125, 300.0, width=32))
 
 
 def drawn(data: st.DataObject, n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -105,6 +107,21 @@ def test_counts_do_not_fall_with_the_price(index: int, a: float, b: float, n: in
     curves, most = curves_of(np.array([a]), np.array([b])), np.array([n])
     assert price(index) < price(index + 1)
     assert fragments_at(price(index), curves, most, 0) <= fragments_at(price(index + 1), curves, most, 0)
+
+
+@given(st.floats(-(2.0**100), 2.0**100, width=32), st.floats(2.0**-12, 2.0**98, width=32))
+def test_what_a_trained_network_answers_is_within_the_limits_as_it_is(a: float, b: float) -> None:
+    gain, decay = within_limits(np.array([a]), np.array([b]))
+    assert (gain[0], decay[0]) == (np.float32(a), np.float32(b))
+
+
+def test_what_is_nan_comes_after_all_others() -> None:
+    a, b = np.array([NAN, -8.0, -1e9, INF]), np.array([0.5, 0.5, NAN, 2.0])
+    found = [solve_on_lattice(curves_of(a, b), np.full(4, 9), budget).k.tolist() for budget in (4, 20, 22, 30)]
+    assert found[0] == [1, 1, 1, 1]
+    assert found[1] == [1, 9, 1, 9]
+    assert [k[1::2] for k in found[1:]] == [[9, 9]] * 3
+    assert [sum(k) for k in found] == [4, 20, 22, 30]
 
 
 @pytest.mark.parametrize("a", [-MOST_GAIN, 0.0, MOST_GAIN])

@@ -10,6 +10,13 @@ layout(std430, binding = 5) writeonly buffer Curves { vec2 curve[]; };  // [P], 
 
 uniform uint pixels;
 
+// `clamp`, and the least for NaN, which a network that overflows can answer: clamp(NaN) may be anything, and where a curve
+// is NaN no price uses the budget. The bits are asked because a compiler may take it that a comparison never meets NaN.
+float within(float x, float least, float most) {
+    bool is_nan = (floatBitsToUint(x) & 0x7FFFFFFFu) > 0x7F800000u;
+    return is_nan ? least : clamp(x, least, most);
+}
+
 void main() {
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     uint p = 64u * group + gl_LocalInvocationIndex;
@@ -17,5 +24,5 @@ void main() {
     float x[DIAPHANE_FEATURES];
     read_features(int(p), x);
     vec2 gain = diaphane_predict(x).xy;
-    curve[p] = vec2(clamp(gain.x, -MOST_GAIN, MOST_GAIN), clamp(1.0 / gain.y, LEAST_RATE, MOST_RATE));
+    curve[p] = vec2(within(gain.x, -MOST_GAIN, MOST_GAIN), within(1.0 / gain.y, LEAST_RATE, MOST_RATE));
 }

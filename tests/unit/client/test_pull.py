@@ -6,9 +6,11 @@ import hashlib
 import json
 import os
 import random
+import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -16,20 +18,15 @@ from typing import Any
 import pytest
 from support.bundles import make_bundle
 from support.release_server import KEY, ReleaseServer
+from support.releases import SIGNER, STRANGER, Record, publish, record_of, serve
 
 from diaphane_client import Denied, NotFound, PullError, Refused, Unavailable, cached, pull
 from diaphane_client import server as client_server
 from schemas.bundle import FILES, MANIFEST
 from schemas.service import FileRef
-from services.registry import Signer
-from services.registry.names import bundle_files, digest_of
-from services.registry.signing import statement
+from services.registry.names import bundle_files
 
 CLIENT = Path(__file__).parents[3] / "deploy" / "client" / "python"
-SIGNER = Signer(lambda: b"s" * 32)
-STRANGER = Signer(lambda: b"x" * 32)
-
-Record = dict[str, Any]
 
 
 @pytest.fixture
@@ -38,38 +35,6 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[ReleaseServer]:
     found = ReleaseServer()
     yield found
     found.stop()
-
-
-def record_of(version: str, files: dict[str, FileRef], signer: Signer = SIGNER, name: str = "glass") -> Record:
-    text = statement(name, version, digest_of(files), "2026-01-01T00:00:00Z", files)
-    return {
-        "name": name,
-        "version": version,
-        "digest": digest_of(files),
-        "files": {file: reference.model_dump() for file, reference in files.items()},
-        "statement": text,
-        "signature": signer.sign(text),
-        "public_key": signer.public_key,
-        "score": 0.5,
-        "aliases": ["champion"],
-    }
-
-
-def publish(
-    server: ReleaseServer, tmp_path: Path, version: str, *, signer: Signer = SIGNER, alias: str = "champion"
-) -> Record:
-    """Serves a bundle under a version and an alias."""
-    bundle = make_bundle(tmp_path / f"published-{version}-{len(server.blobs)}", f"{version} " + "w" * 5000)
-    files = bundle_files(bundle)
-    server.blobs |= {files[name].sha256: (bundle / name).read_bytes() for name in files}
-    record = record_of(version, files, signer)
-    serve(server, record, alias)
-    return record
-
-
-def serve(server: ReleaseServer, record: Record, alias: str = "champion") -> None:
-    for selector in (alias, record["version"]):
-        server.records[f"glass/versions/{selector}"] = json.dumps(record).encode()
 
 
 def fetch(server: ReleaseServer, tmp_path: Path, alias: str = "champion", **options: Any) -> Path:
@@ -237,19 +202,47 @@ def test_a_tampered_file_is_refused_and_the_old_bundle_stays(name: str, server: 
     assert fetch(server, tmp_path).name == "1.1.0"
 
 
+INVALID: list[tuple[dict[str, Any], str]] = [
+    ({"format": "other/1"}, "format 'other/1'"),
+    ({"files": {}}, "there are no files"),
+    ({"files": {FILES[0]: {}}}, "missing"),
+    ({"hidden": [5]}, "the layers do not follow"),
+    ({"features": []}, "no features"),
+    ({"features": [{"name": "count", "mean": 0.0, "std": 0.0}]}, "no spread"),
+    ({"features": [{"name": "count", "mean": float("nan"), "std": 1.0}]}, "not finite"),
+    ({"outputs": ["a"]}, "does not answer a"),
+    ({"head": "other"}, "head 'other'"),
+    ({"self_test": None, "tail": None}, "another type"),
+    ({"surprise": 1}, "surprise is unknown"),
+]
+
+
+@pytest.mark.parametrize(("change", "why"), INVALID)
+def test_a_manifest_that_is_not_valid_is_refused_though_it_is_signed(
+    change: dict[str, Any], why: str, server: ReleaseServer, tmp_path: Path
+) -> None:
+    with pytest.raises(Refused, match=f"not one that this client understands: .*{why}"):
+        _fetch_with_manifest(server, tmp_path, change)
+    assert visible(tmp_path) == []
+
+
 def test_a_manifest_that_lists_other_files_is_refused_though_it_is_signed(
     server: ReleaseServer, tmp_path: Path
 ) -> None:
+    files = json.loads((make_bundle(tmp_path / "other", "other") / MANIFEST).read_bytes())["files"]
+    with pytest.raises(Refused, match="does not list the files"):
+        _fetch_with_manifest(server, tmp_path, {"files": files})
+    assert visible(tmp_path) == []
+
+
+def _fetch_with_manifest(server: ReleaseServer, tmp_path: Path, change: dict[str, Any]) -> None:
     bundle = make_bundle(tmp_path / "bundle")
     manifest = json.loads((bundle / MANIFEST).read_text())
-    for change in ({"format": "other/1"}, {"files": {}}, {"files": {**manifest["files"], FILES[0]: {}}}):
-        (bundle / MANIFEST).write_text(json.dumps({**manifest, **change}))
-        files = bundle_files(bundle)
-        server.blobs |= {files[name].sha256: (bundle / name).read_bytes() for name in files}
-        serve(server, record_of("1.0.0", files))
-        with pytest.raises(Refused, match="does not list the files"):
-            fetch(server, tmp_path)
-    assert visible(tmp_path) == []
+    (bundle / MANIFEST).write_text(json.dumps({**manifest, **change}))
+    files = bundle_files(bundle)
+    server.blobs |= {files[name].sha256: (bundle / name).read_bytes() for name in files}
+    serve(server, record_of("1.0.0", files))
+    fetch(server, tmp_path)
 
 
 def test_a_lower_version_is_refused_unless_it_was_asked_for(server: ReleaseServer, tmp_path: Path) -> None:
@@ -439,11 +432,19 @@ def test_two_processes_that_pull_at_once_both_get_the_bundle(server: ReleaseServ
     assert visible(tmp_path) == ["1.0.0"]
 
 
-def test_the_client_needs_nothing_of_the_service(tmp_path: Path) -> None:
+def test_the_client_needs_numpy_and_an_http_client_and_nothing_else(tmp_path: Path) -> None:
     shutil.copytree(CLIENT / "diaphane_client", tmp_path / "diaphane_client")
     code = (
-        "import sys, diaphane_client; "
-        "print({'schemas', 'renderer', 'labeller', 'trainer', 'services', 'numpy', 'pydantic'} & set(sys.modules))"
+        "import sys; before = set(sys.modules); import diaphane_client; "
+        "found = {name.split('.')[0] for name in set(sys.modules) - before} - set(sys.stdlib_module_names); "
+        "print(*sorted(name for name in found if not name.startswith('_')))"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=True, capture_output=True, text=True)
-    assert done.stdout == "set()\n"
+    of_httpx = {"anyio", "certifi", "h11", "httpcore", "idna", "sniffio", "typing_extensions"}
+    # What httpx takes along where it happens to be installed: its command line, and other transports.
+    optional = {"click", "rich", "pygments", "markdown_it", "mdurl", "h2", "hpack", "hyperframe", "socksio", "brotli"}
+    found = set(done.stdout.split())
+    assert {"diaphane_client", "httpx", "numpy"} <= found
+    assert found <= {"diaphane_client", "httpx", "numpy", *of_httpx, *optional}
+    declared = tomllib.loads((CLIENT / "pyproject.toml").read_text())["project"]["dependencies"]
+    assert [re.split("[<>=]", each)[0] for each in declared] == ["httpx", "numpy"]

@@ -1,6 +1,21 @@
-"""Fetches published bundles, verified by hash and signature."""
+"""Fetches published bundles, verified by hash and signature, keeps them up to date, and runs them on numpy."""
 
+from diaphane_client.allocation import allocate, fill
 from diaphane_client.errors import Denied, NotFound, PullError, Refused, Unavailable
+from diaphane_client.predictor import Predictor
 from diaphane_client.pulling import cached, pull
+from diaphane_client.watching import watch
 
-__all__ = ["Denied", "NotFound", "PullError", "Refused", "Unavailable", "cached", "pull"]
+__all__ = [
+    "Denied",
+    "NotFound",
+    "Predictor",
+    "PullError",
+    "Refused",
+    "Unavailable",
+    "allocate",
+    "cached",
+    "fill",
+    "pull",
+    "watch",
+]

@@ -18,7 +18,7 @@ class PullError(Exception):
 
 
 class Refused(PullError):
-    """A hash, a signature, a key or a version is not what it must be."""
+    """A hash, a signature, a key, a version or a manifest is not what it must be."""
 
 
 class Unavailable(PullError):

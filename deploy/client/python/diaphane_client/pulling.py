@@ -10,7 +10,8 @@ from pathlib import Path
 
 from diaphane_client.cache import Cache, Pointer
 from diaphane_client.errors import NotFound, Refused, Unavailable
-from diaphane_client.release import MANIFEST, Release, check_manifest, parse, verify
+from diaphane_client.manifest import MANIFEST
+from diaphane_client.release import Release, check_manifest, parse, verify
 from diaphane_client.server import Server
 
 _NAME = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?")
@@ -53,6 +54,33 @@ def pull(
         NotFound: There is no such bundle, version or alias.
         OSError: The folder cannot be written.
     """
+    bundle, trouble = update(
+        name,
+        alias,
+        url=url,
+        key=key,
+        folder=folder,
+        public_key=public_key,
+        allow_rollback=allow_rollback,
+        timeout=timeout,
+    )
+    if trouble:
+        log.warning("%s Using '%s' %s of an earlier pull.", trouble.what, name, bundle.name)
+    return bundle
+
+
+def update(
+    name: str,
+    alias: str,
+    *,
+    url: str,
+    key: str | None,
+    folder: str | os.PathLike[str],
+    public_key: str | None,
+    allow_rollback: bool,
+    timeout: float,
+) -> tuple[Path, Unavailable | None]:
+    """What `pull` does, and why the bundle is that of an earlier pull, if the server could not be asked."""
     cache = Cache(Path(folder), _checked(name, alias))
     server_name = url.rstrip("/")
     with cache.lock():
@@ -63,7 +91,7 @@ def pull(
             with Server(url, key, timeout) as server:
                 answer = server.record(name, alias, before.etag if before and have else "")
                 if answer is None and have:
-                    return have
+                    return have, None
                 content, etag = answer or (b"", "")
                 release = parse(content)
                 verify(release, name, alias, [known or release.public_key])
@@ -72,12 +100,11 @@ def pull(
                 cache.pin_key(server_name, release.public_key)
                 bundle = cache.bundle(release) or _fetch(server, cache, release)
         except Unavailable as error:
-            if have is None or before is None:
+            if have is None:
                 raise
-            log.warning("%s Using '%s' %s of an earlier pull.", error.what, name, before.release.version)
-            return have
+            return have, error
         cache.point(alias, Pointer(release, etag))
-        return bundle
+        return bundle, None
 
 
 def cached(

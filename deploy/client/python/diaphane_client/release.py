@@ -16,33 +16,16 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from cryptography.exceptions import InvalidSignature
-from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
-
+from diaphane_client.ed25519 import is_signed
 from diaphane_client.errors import Refused
+from diaphane_client.manifest import MANIFEST, FileRef, parse_files, parse_manifest
 
 STATEMENT_FORMAT: Final = "diaphane-release/1"
-BUNDLE_FORMATS: Final = ("diaphane-bundle/1", "diaphane-bundle/2")
-MANIFEST: Final = "manifest.json"
-
 MAX_RECORD_BYTES: Final = 1 << 20
-MAX_MANIFEST_BYTES: Final = 1 << 20
-MAX_FILE_BYTES: Final = 64 << 20
-MAX_FILES: Final = 16
 
-_FILE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
-_SHA256 = re.compile(r"[0-9a-f]{64}")
 _VERSION = re.compile(r"(\d{1,6})\.(\d{1,6})\.(\d{1,6})")
 
 _SERVED_WRONG = "Ask who runs the server: it may be misconfigured, or somebody may have tampered with it."
-
-
-@dataclass(frozen=True)
-class FileRef:
-    """A file of a bundle."""
-
-    sha256: str
-    bytes: int
 
 
 @dataclass(frozen=True)
@@ -95,7 +78,7 @@ def parse(content: bytes) -> Release:
         texts = {name: record[name] for name in ("name", "version", "digest", "statement", "signature", "public_key")}
         if not all(isinstance(text, str) for text in texts.values()):
             raise TypeError("a text is not one")
-        release = Release(**texts, files=_files(record["files"]))
+        release = Release(**texts, files=parse_files(record["files"]))
         if MANIFEST not in release.files:
             raise ValueError("there is no manifest")
         return release
@@ -137,39 +120,23 @@ def verify(release: Release, name: str, selector: str, trusted: Collection[str])
 
 
 def check_manifest(content: bytes, release: Release) -> None:
-    """Checks that a bundle's manifest lists the files that the release has.
+    """Checks that a bundle's manifest is valid and lists the files that the release has.
 
     Raises:
         Refused: It does not.
     """
     try:
-        manifest = json.loads(content)
-        fits = manifest["format"] in BUNDLE_FORMATS and {
-            **_files(manifest["files"]),
-            MANIFEST: release.files[MANIFEST],
-        } == dict(release.files)
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        fits = False
-    if not fits:
+        listed = parse_manifest(content).files
+    except ValueError as error:
+        raise Refused(
+            f"The manifest of '{release.name}' {release.version} is not one that this client understands: {error}.",
+            "Update diaphane-client; if that does not help, publish the bundle again.",
+        ) from error
+    if {**listed, MANIFEST: release.files[MANIFEST]} != dict(release.files):
         raise Refused(
             f"The manifest of '{release.name}' {release.version} does not list the files that it is published with.",
-            "Update diaphane-client; if that does not help, publish the bundle again.",
+            "Publish the bundle again.",
         )
-
-
-def _files(listed: Mapping[str, Mapping[str, Any]]) -> dict[str, FileRef]:
-    files = {}
-    for name, file in listed.items():
-        sha256, size = file["sha256"], file["bytes"]
-        limit = MAX_MANIFEST_BYTES if name == MANIFEST else MAX_FILE_BYTES
-        if not _FILE_NAME.fullmatch(name) or not _SHA256.fullmatch(sha256):
-            raise ValueError("a file has no proper name or hash")
-        if type(size) is not int or not 0 <= size <= limit:
-            raise ValueError("a file has no proper size")
-        files[name] = FileRef(sha256, size)
-    if not 0 < len(files) <= MAX_FILES:
-        raise ValueError("there are no files, or too many")
-    return files
 
 
 def _digest(files: Mapping[str, FileRef]) -> str:
@@ -179,9 +146,8 @@ def _digest(files: Mapping[str, FileRef]) -> str:
 
 def _is_signed(release: Release) -> bool:
     try:
-        key = Ed25519PublicKey.from_public_bytes(base64.b64decode(release.public_key, validate=True))
-        key.verify(base64.b64decode(release.signature, validate=True), release.statement.encode())
+        key, signature = (base64.b64decode(text, validate=True) for text in (release.public_key, release.signature))
         json.loads(release.statement)
-    except (InvalidSignature, ValueError, RecursionError):
+        return is_signed(key, release.statement.encode(), signature)
+    except (ValueError, RecursionError):
         return False
-    return True

@@ -14,7 +14,8 @@ import httpx
 
 from diaphane_client.errors import Denied, NotFound, PullError, Refused, Unavailable
 from diaphane_client.files import file_sha256
-from diaphane_client.release import MAX_RECORD_BYTES, FileRef
+from diaphane_client.manifest import FileRef
+from diaphane_client.release import MAX_RECORD_BYTES
 
 ATTEMPTS = 6
 """How often in a row a download may stop before the server is taken for unavailable."""

@@ -184,6 +184,22 @@ def test_aliases_move_and_come_back_with_their_history(full: Api) -> None:
     assert unknown.status_code == 404
 
 
+def test_a_version_s_etag_changes_with_what_its_record_says(full: Api) -> None:
+    alias, path = "/v1/models/glass/aliases/champion", "/v1/models/glass/versions/champion"
+    assert full.request("PUT", alias, "publish", json={"version": "1.1.0", "reason": "first"}).status_code == 200
+    first = full.get(path)
+    tag = first.headers["etag"]
+    for header in (tag, f"W/{tag}", f'"other", {tag}', "*"):
+        same = full.get(path, headers={"If-None-Match": header})
+        assert (same.status_code, same.content, same.headers["etag"]) == (304, b"", tag)
+    assert full.get(path, headers={"If-None-Match": '"other"'}).json() == first.json()
+    moved = {"version": "1.0.0", "reason": "better"}
+    assert full.request("PUT", alias, "publish", json=moved).status_code == 200
+    after = full.get(path, headers={"If-None-Match": tag})
+    assert (after.status_code, after.json()["version"]) == (200, "1.0.0")
+    assert after.headers["etag"] != tag
+
+
 def test_keys_show_no_secret(api: Api) -> None:
     made = api.post("/v1/keys", "admin", json={"name": "ci", "scopes": ["submit"], "expires": "2100-01-01T00:00:00Z"})
     assert made.json()["key"]["expires"] == "2100-01-01T00:00:00.000000Z"

@@ -1,0 +1,214 @@
+"""A bundle's manifest, as far as a client needs it: what the network reads and answers, and the files by hash.
+
+Rules:
+- members that this client does not know are refused, as are those that it needs and that are not there;
+- the layers follow from the features, the hidden units and the outputs;
+- numbers are finite, spreads positive.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Final
+
+MANIFEST: Final = "manifest.json"
+WEIGHTS: Final = "weights.safetensors"
+
+MAX_MANIFEST_BYTES: Final = 1 << 20
+MAX_FILE_BYTES: Final = 64 << 20
+MAX_FILES: Final = 16
+MAX_FEATURES: Final = 256
+MAX_HIDDEN: Final = 8
+
+HEADS: Final[Mapping[str, tuple[tuple[str, ...], ...]]] = {
+    "gain-curve": (("a", "b"), ("a", "b", "g")),
+    "importance": (("importance",),),
+}
+"""What a network of each head may answer; the first is meant where a manifest does not say."""
+
+_FORMATS: Final = ("diaphane-bundle/1", "diaphane-bundle/2")
+_ALWAYS: Final = frozenset(
+    (
+        *("format", "name", "features", "hidden", "layers", "tail", "metric", "k_min", "files"),
+        *("parity", "provenance", "evaluation"),
+    )
+)
+_SECOND: Final = frozenset(("onnx", "self_test"))
+_KNOWN: Final = _ALWAYS | _SECOND | {"head", "outputs"}
+
+_FILE_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
+_SHA256: Final = re.compile(r"[0-9a-f]{64}")
+
+
+@dataclass(frozen=True)
+class FileRef:
+    """A file of a bundle."""
+
+    sha256: str
+    bytes: int
+
+
+@dataclass(frozen=True)
+class Feature:
+    """An input of the network: it reads `clamp((x - mean) / std, -4, 4)`."""
+
+    name: str
+    mean: float
+    std: float
+
+
+@dataclass(frozen=True)
+class SelfTest:
+    """Inputs, [R][features], and the answers to them in float64, [R][outputs], whose sizes are `scale`, [outputs]."""
+
+    features: list[list[float]]
+    outputs: list[list[float]]
+    scale: list[float]
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a bundle is.
+
+    Attributes:
+        head: How the outputs are read: `gain-curve` or `importance`.
+        outputs: What the network answers, in this order; one of `HEADS[head]`.
+        features: Inputs, in order.
+        hidden: Units of each hidden layer (ReLU).
+        tail: Name of the tail that has to be rendered.
+        g: The density tail's constant.
+        files: Every other file.
+        self_test: Rows to check the network with; None in the first format.
+    """
+
+    head: str
+    outputs: tuple[str, ...]
+    features: tuple[Feature, ...]
+    hidden: tuple[int, ...]
+    tail: str
+    g: float
+    files: Mapping[str, FileRef]
+    self_test: SelfTest | None
+
+    @property
+    def layers(self) -> dict[str, tuple[int, ...]]:
+        """Tensor -> shape, in order; weights are [out, in]."""
+        return _layers(len(self.features), self.hidden, len(self.outputs))
+
+
+def parse_manifest(content: bytes) -> Manifest:
+    """Reads a manifest.
+
+    Raises:
+        ValueError: It is not valid; the text says why.
+    """
+    try:
+        return _parsed(json.loads(content))
+    except (KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise ValueError(f"a member is missing or of another type ({error})") from error
+
+
+def parse_files(listed: Mapping[str, Mapping[str, Any]]) -> dict[str, FileRef]:
+    """Names, sizes and hashes of files.
+
+    Raises:
+        ValueError: A name leads elsewhere, or a size or hash is none.
+        TypeError, KeyError, AttributeError: It is no such list.
+    """
+    files = {}
+    for name, file in listed.items():
+        sha256, size = file["sha256"], file["bytes"]
+        limit = MAX_MANIFEST_BYTES if name == MANIFEST else MAX_FILE_BYTES
+        if not _FILE_NAME.fullmatch(name) or not _SHA256.fullmatch(sha256):
+            raise ValueError("a file has no proper name or hash")
+        if type(size) is not int or not 0 <= size <= limit:
+            raise ValueError("a file has no proper size")
+        files[name] = FileRef(sha256, size)
+    if not 0 < len(files) <= MAX_FILES:
+        raise ValueError("there are no files, or too many")
+    return files
+
+
+def _parsed(fields: Any) -> Manifest:
+    kind = fields["format"]
+    if kind not in _FORMATS:
+        raise ValueError(f"its format {kind!r} is not one of {', '.join(_FORMATS)}")
+    needed = _ALWAYS if kind == _FORMATS[0] else _ALWAYS | _SECOND
+    if missing := needed - fields.keys():
+        raise ValueError(f"{', '.join(sorted(missing))} is missing")
+    if unknown := fields.keys() - _KNOWN:
+        raise ValueError(f"{', '.join(sorted(unknown))} is unknown")
+    head = fields.get("head", "gain-curve")
+    outputs = tuple(fields.get("outputs", HEADS.get(head, ((),))[0]))
+    if outputs not in HEADS.get(head, ()):
+        raise ValueError(f"a network of the head {head!r} does not answer {', '.join(map(str, outputs))}")
+    features = tuple(
+        Feature(_text(each["name"]), _number(each["mean"]), _number(each["std"])) for each in _features(fields)
+    )
+    if len({feature.name for feature in features}) < len(features) or any(feature.std <= 0.0 for feature in features):
+        raise ValueError("a feature is listed twice, or has no spread")
+    manifest = Manifest(
+        head=head,
+        outputs=outputs,
+        features=features,
+        hidden=_hidden(fields["hidden"]),
+        tail=_text(fields["tail"]["name"]),
+        g=_number(fields["tail"]["g"]),
+        files=parse_files(fields["files"]),
+        self_test=_self_test(fields.get("self_test"), len(features), len(outputs)),
+    )
+    if {each["name"]: tuple(each["shape"]) for each in fields["layers"]} != manifest.layers:
+        raise ValueError("the layers do not follow from the features, the hidden units and the outputs")
+    if WEIGHTS not in manifest.files:
+        raise ValueError(f"there is no {WEIGHTS}")
+    return manifest
+
+
+def _features(fields: Mapping[str, Any]) -> list[Any]:
+    listed = fields["features"]
+    if not isinstance(listed, list) or not 1 <= len(listed) <= MAX_FEATURES:
+        raise ValueError("there are no features, or too many")
+    return listed
+
+
+def _hidden(units: Any) -> tuple[int, ...]:
+    if not isinstance(units, list) or len(units) > MAX_HIDDEN or not all(type(n) is int and n > 0 for n in units):
+        raise ValueError("the hidden units are not a short list of numbers")
+    return tuple(units)
+
+
+def _self_test(fields: Any, inputs: int, outputs: int) -> SelfTest | None:
+    if fields is None:
+        return None
+    found = SelfTest(fields["features"], fields["outputs"], fields["output_scale"])
+    sizes = [(inputs, found.features), (outputs, found.outputs), (outputs, [found.scale])]
+    if len(found.features) != len(found.outputs) or any(len(row) != size for size, rows in sizes for row in rows):
+        raise ValueError("the self-test is not of the size of the network")
+    for row in (*found.features, *found.outputs, found.scale):
+        for value in row:
+            _number(value)
+    return found
+
+
+def _layers(inputs: int, hidden: tuple[int, ...], outputs: int) -> dict[str, tuple[int, ...]]:
+    shapes: dict[str, tuple[int, ...]] = {}
+    for i, (before, after) in enumerate(pairwise((inputs, *hidden, outputs))):
+        shapes |= {f"layer{i}.weight": (after, before), f"layer{i}.bias": (after,)}
+    return shapes
+
+
+def _number(value: Any) -> float:
+    if type(value) not in (int, float) or not math.isfinite(value):
+        raise ValueError("a number is not finite")
+    return float(value)
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError("a name is no text")
+    return value

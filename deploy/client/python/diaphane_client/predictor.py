@@ -1,0 +1,122 @@
+"""A bundle's network on numpy, for those without a GPU: from features and a budget to the fragments of each pixel."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diaphane_client.allocation import allocate, fill
+from diaphane_client.errors import Refused
+from diaphane_client.manifest import MANIFEST, MAX_MANIFEST_BYTES, WEIGHTS, Manifest, parse_manifest
+from diaphane_client.network import Network, read_network
+
+SELF_TEST_TOLERANCE: Final = 1e-4
+"""Largest difference of an answer to the manifest's rows, relative to its scale: another order of sums passes."""
+
+_ONLY_WITH_FRAGMENTS: Final = frozenset(("optical_depth", "alpha_mean", "alpha_nearest"))
+"""Features that are above 0 in every pixel with a fragment that can be seen."""
+
+
+@dataclass(frozen=True)
+class Predictor:
+    """A bundle that was read, and whose answers to its own test rows are right.
+
+    Attributes:
+        manifest: What it reads and answers, and the tail that has to be rendered with its counts.
+        network: Its weights.
+    """
+
+    manifest: Manifest
+    network: Network
+
+    @classmethod
+    def load(cls, folder: str | os.PathLike[str]) -> Self:
+        """Reads a bundle.
+
+        Args:
+            folder: As `pull` returns it.
+
+        Raises:
+            Refused: Manifest and weights are not valid, do not belong together, or fail the manifest's self-test.
+            OSError: They cannot be read.
+        """
+        try:
+            with (Path(folder) / MANIFEST).open("rb") as stream:
+                manifest = parse_manifest(stream.read(MAX_MANIFEST_BYTES + 1))
+            with (Path(folder) / WEIGHTS).open("rb") as stream:
+                content = stream.read(manifest.files[WEIGHTS].bytes + 1)
+            if hashlib.sha256(content).hexdigest() != manifest.files[WEIGHTS].sha256:
+                raise ValueError(f"{WEIGHTS} is not the file that the manifest lists")
+            predictor = cls(manifest, read_network(content, manifest))
+            predictor._check()
+        except ValueError as error:
+            raise Refused(f"The bundle {folder} cannot be used: {error}.", "Pull it again.") from error
+        return predictor
+
+    @property
+    def features(self) -> tuple[str, ...]:
+        """Names of the inputs, in order; docs/BUNDLE.md says how each is made of a pixel's fragments."""
+        return tuple(feature.name for feature in self.manifest.features)
+
+    def answer(self, features: NDArray[np.floating]) -> NDArray[np.float32]:
+        """What the network answers.
+
+        Args:
+            features: [P, C], columns `features`, not normalised.
+
+        Returns:
+            float32 [P, outputs], columns `manifest.outputs`.
+
+        Raises:
+            ValueError: There are more or fewer columns, or a number is not finite.
+        """
+        inputs = np.asarray(features)
+        if inputs.ndim != 2 or inputs.shape[1] != len(self.features):
+            raise ValueError(f"the network reads {len(self.features)} columns: {', '.join(self.features)}")
+        if not np.isfinite(inputs).all():
+            raise ValueError("features must be finite")
+        return self.network.answer(inputs)
+
+    def predict(
+        self, features: NDArray[np.floating], F: int, n: NDArray[np.integer] | None = None
+    ) -> NDArray[np.int32]:
+        """The fragments to keep exactly in each pixel, nearest first; the tail holds the others.
+
+        Args:
+            features: [P, C], columns `features`, not normalised; zeros where a pixel has no fragments.
+            F: Fragments to spend on all pixels together.
+            n: int [P], fragments of each pixel; None: what `log_n` says, where the network reads it.
+
+        Returns:
+            int32 [P], k with `sum k = min(F, sum n)`: the counts of the Python renderer.
+
+        Raises:
+            ValueError: An argument is not as described, or n is needed.
+        """
+        answers = self.answer(features)
+        counts = self._counts(np.asarray(features)) if n is None else np.asarray(n)
+        if self.manifest.head == "importance":
+            return fill(np.nan_to_num(answers[:, 0]), counts, F)  # NaN, of a network that overflows, is no importance
+        return allocate(answers[:, 0], answers[:, 1], counts, F)[0]
+
+    def _counts(self, features: NDArray[np.floating]) -> NDArray[np.int64]:
+        # log2 of float32 is exact to far less than a fragment for all counts that a pixel can have.
+        names = self.features
+        if "log_n" not in names or not _ONLY_WITH_FRAGMENTS & set(names):
+            raise ValueError("this network does not read how many fragments a pixel has: give n")
+        n = np.rint(np.exp2(features[:, names.index("log_n")].astype(np.float64)))
+        return np.where((features != 0.0).any(axis=1), n, 0.0).astype(np.int64)
+
+    def _check(self) -> None:
+        test = self.manifest.self_test
+        if test is None or not test.features:
+            return
+        difference = self.network.answer(np.array(test.features)) - np.array(test.outputs)
+        if not (np.abs(difference) <= SELF_TEST_TOLERANCE * np.array(test.scale)).all():
+            raise ValueError("the network does not answer its own test rows as it should")

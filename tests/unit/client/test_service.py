@@ -1,0 +1,56 @@
+"""The client and the real API understand each other."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from fastapi.testclient import TestClient
+from support.api import Api
+
+from diaphane_client import Denied, NotFound, Refused, cached, pull
+from diaphane_client import server as client_server
+from schemas.bundle import load_manifest
+
+
+@pytest.fixture
+def api(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Api:
+    found = Api(tmp_path / "service")
+
+    def client(*, headers: dict[str, str], **_: Any) -> httpx.Client:
+        return TestClient(found.app, base_url="http://localhost", headers=headers, follow_redirects=False)
+
+    monkeypatch.setattr(client_server.httpx, "Client", client)
+    return found
+
+
+def test_a_published_version_is_pulled_once_and_followed_by_its_alias(
+    api: Api, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO, logger="httpx")
+    options: dict[str, Any] = {"url": "http://localhost", "key": api.secrets["read"], "folder": tmp_path / "bundles"}
+    with pytest.raises(NotFound):
+        pull("glass", **options)
+    for version in ("1.0.0", "1.1.0"):
+        api.version(tmp_path / version, version)
+    api.service.registry.promote("glass", "1.0.0", "first")
+    first = pull("glass", **options)
+    assert load_manifest(first).name == "glass"
+    caplog.clear()
+    assert pull("glass", **options) == first
+    assert [record.message.split('"')[1] for record in caplog.records if record.name == "httpx"] == [
+        "HTTP/1.1 304 Not Modified"
+    ]
+    api.service.registry.promote("glass", "1.1.0", "better")
+    assert pull("glass", **options).name == "1.1.0"
+    api.service.registry.rollback("glass", "worse")
+    with pytest.raises(Refused, match="allow_rollback=True"):
+        pull("glass", **options)
+    assert pull("glass", allow_rollback=True, **options) == first
+    assert pull("glass", "1.1.0", **options).name == "1.1.0"
+    assert cached("glass", url="http://localhost", folder=tmp_path / "bundles") == first
+    with pytest.raises(Denied):
+        pull("glass", **{**options, "key": "dia_unknown"})
