@@ -1,4 +1,4 @@
-"""The renderer, measured: capture against bare rasterising, the price of learning, reuse of a scene, every technique.
+"""The renderer, measured: capture against bare rasterising, reuse of a scene, the price of learning.
 
 python -m benchmarks.renderer --bundle FOLDER --out benchmarks/results/renderer.json --page benchmarks/RENDERER.md
 """
@@ -19,10 +19,9 @@ from benchmarks.render.bundle import random_bundle
 from benchmarks.render.page import page
 from benchmarks.render.setup import subjects
 from renderer.context import describe, gl_context
-from renderer.techniques import TECHNIQUES
 from services.versions import library_versions, machine
 
-PARTS = ("capture", "views", "learned", "techniques")
+PARTS = ("capture", "views", "learned")
 
 
 def main() -> int:
@@ -49,8 +48,6 @@ def main() -> int:
                 found["views"].append(measure.second_view(subject, arguments.rounds))
             if "learned" in arguments.parts:
                 found["learned"].append(measure.learned_cost(subject, bundle, arguments.rounds))
-            if "techniques" in arguments.parts:
-                found["techniques"] += measure.every_technique(subject, trained, 2, arguments.techniques)
     found["load_average"]["after"] = os.getloadavg()
     text = page(found)
     print(text)
@@ -65,7 +62,6 @@ def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS))
     parser.add_argument("--scenes", nargs="+", choices=("thicket", "sponza"), default=["thicket", "sponza"])
-    parser.add_argument("--techniques", nargs="+", choices=list(TECHNIQUES), default=list(TECHNIQUES))
     parser.add_argument("--rounds", type=int, default=9, help="Rounds of what is measured in turns.")
     parser.add_argument("--bundle", type=Path, help="Folder of a trained bundle; without it, random weights.")
     parser.add_argument("--out", type=Path, help="Where the figures go, JSON.")

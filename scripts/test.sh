@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# All tests: those of single modules beside those of the renderer and the engine's kills, which use one core each; then
-# tests/integration by itself, for it waits for processes that it kills and starts. With arguments: pytest with these.
+# All tests, two sets of them at once, each of which uses one core: those of single modules beside those of the renderer
+# and the engine's kills; then, of tests/integration, those that compute themselves beside those that wait for processes
+# that they start and kill. With arguments: pytest with these.
 set -uo pipefail
 pytest="${BIN:-.venv/bin}/pytest"
 if [ "$#" -gt 0 ]; then
@@ -8,11 +9,25 @@ if [ "$#" -gt 0 ]; then
 fi
 said=$(mktemp)
 trap 'rm -f "$said"' EXIT
-"$pytest" -p no:cacheprovider tests/unit tests/property > "$said" 2>&1 &
-modules=$!
 worst=0
-"$pytest" tests/attacks tests/chaos tests/differential tests/docs tests/golden || worst=$?
-wait "$modules" || worst=$?
-cat "$said"
-"$pytest" tests/integration || worst=$?
+
+# Runs tests beside the next ones, until `join` shows what they said.
+beside() {
+    "$pytest" --durations=15 -p no:cacheprovider "$@" > "$said" 2>&1 &
+}
+
+join() {
+    wait "$!" || worst=$?
+    cat "$said"
+}
+
+computing=(tests/integration/test_{build,cli,cli_bench,cli_remote,cli_render,retrain,stress_gl,zink}.py)
+computing+=(tests/integration/test_{labeller,predictors}_benchmark.py)
+
+beside tests/unit tests/property
+"$pytest" --durations=15 tests/attacks tests/chaos tests/differential tests/docs tests/golden || worst=$?
+join
+beside "${computing[@]}"
+"$pytest" --durations=15 tests/integration "${computing[@]/#/--ignore=}" || worst=$?
+join
 exit "$worst"

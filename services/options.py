@@ -15,16 +15,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from schemas.limits import LIMITS
 from schemas.network import DEFAULT_NETWORK, SIZES, NetworkSize
 from schemas.problem import ExitCode, Problem
 from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAILS, TailName
 from services.registry import check_name
-
-MIN_SIDE = 16
-MAX_PIXELS = 7680 * 4320
-"""Pictures beyond 8K are refused: a view's fragments would not fit in memory."""
-MAX_BUDGET = 4096.0
-MAX_VIEWS = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +95,45 @@ class BuildOptions:
             depth = next(d for d in range(1, len(parts) + 1) if _is_unique(parts[-d:], self.scenes))
             labels[scene] = "/".join(parts[-depth:])
         return labels
+
+
+def check_budget(budget: float, option: str, size: tuple[int, int] | None = None) -> None:
+    """Refuse a budget that no picture can have.
+
+    Args:
+        budget: F as a multiple of width * height.
+        option: How it is given, with an example.
+        size: Width and height of the smallest picture, pixels; None: not known yet.
+
+    Raises:
+        Problem: It is no number above 0, more than any picture may have, or less than one fragment of this one.
+    """
+    if not (math.isfinite(budget) and 0.0 < budget <= LIMITS.budget):
+        raise Problem(
+            f"A budget of {budget:g} cannot be used.",
+            f"Budgets are multiples of width x height, above 0 and at most {LIMITS.budget:g}: {option}.",
+        )
+    if size is not None and budget * size[0] * size[1] < 1.0:
+        # A hundredth more, so that the number is enough when it is rounded too.
+        least = 1.01 / (size[0] * size[1])
+        raise Problem(
+            f"A budget of {budget:g} is less than one fragment of a picture of {size[0]}x{size[1]} pixels.",
+            f"Budgets are multiples of width x height, here {least:.3g} or more: {option}.",
+        )
+
+
+def check_bundle(reference: str | None, option: str) -> None:
+    """Refuse an empty name of a bundle: as a path it would be the folder that the command runs in.
+
+    Args:
+        reference: A folder, or NAME@ALIAS; None: not given.
+        option: Where it was given.
+
+    Raises:
+        Problem: It is empty.
+    """
+    if reference is not None and not reference.strip():
+        raise Problem(f"{option} is empty.", f"Name a folder, or a bundle of the registry: {option} glass@champion.")
 
 
 def parse_budgets(text: str) -> tuple[float, ...]:
@@ -184,22 +218,21 @@ def _check_scenes(scenes: tuple[Path, ...]) -> None:
 def _check_numbers(o: BuildOptions) -> None:
     if not o.budgets:
         raise Problem("No budget was given.", "Give at least one: --budgets 1,2,4.")
+    if len(o.budgets) > LIMITS.budgets:
+        raise Problem(f"{len(o.budgets)} budgets are not possible.", f"Give 1 to {LIMITS.budgets}.")
+    size, views = f"--size {o.width}x{o.height}", f"--views-per-scene {o.views_per_scene}"
+    _require(min(o.width, o.height) >= LIMITS.min_side, size, f"is below {LIMITS.min_side} pixels a side")
+    _require(max(o.width, o.height) <= LIMITS.max_side, size, f"is beyond {LIMITS.max_side} pixels a side")
+    _require(o.width * o.height <= LIMITS.pixels, size, f"is beyond {LIMITS.pixels} pixels")
     for budget in o.budgets:
-        if not (math.isfinite(budget) and 0.0 < budget <= MAX_BUDGET):
-            raise Problem(
-                f"A budget of {budget:g} fragments per pixel cannot be used.",
-                f"Budgets are multiples of width x height, above 0 and at most {MAX_BUDGET:g}: --budgets 1,2,4.",
-            )
-        if budget * o.width * o.height < 1.0:
-            raise Problem(f"A budget of {budget:g} is less than one fragment.", "Give a larger one: --budgets 1,2,4.")
+        check_budget(budget, "--budgets 1,2,4", (o.width, o.height))
+    check_bundle(o.start, "--from")
     _require(o.alpha is None or 0.0 < o.alpha < 1.0, f"--alpha {o.alpha}", "is not between 0 and 1 (both excluded)")
-    _require(min(o.width, o.height) >= MIN_SIDE, f"--size {o.width}x{o.height}", f"is below {MIN_SIDE} pixels a side")
-    _require(o.width * o.height <= MAX_PIXELS, f"--size {o.width}x{o.height}", f"is beyond {MAX_PIXELS} pixels")
-    _require(1 <= o.views_per_scene <= MAX_VIEWS, f"--views-per-scene {o.views_per_scene}", f"is not 1..{MAX_VIEWS}")
+    _require(1 <= o.views_per_scene <= LIMITS.views, views, f"is not 1..{LIMITS.views}")
     _require(math.isfinite(o.g) and 0.0 <= o.g <= 10.0, f"--g {o.g}", "is not between 0 and 10")
     _require(0 <= o.seed < 2**63, f"--seed {o.seed}", "is not a whole number from 0 to 2^63 - 1")
-    _require(o.steps is None or o.steps >= 1, f"--steps {o.steps}", "is not positive")
-    _require(o.patience >= 0, f"--patience {o.patience}", "is negative")
+    _require(o.steps is None or 1 <= o.steps <= LIMITS.steps, f"--steps {o.steps}", f"is not 1..{LIMITS.steps}")
+    _require(0 <= o.patience <= LIMITS.steps, f"--patience {o.patience}", f"is not 0..{LIMITS.steps}")
     _require(o.replay is None or o.start is not None, "--replay", "needs --from: there is nothing to forget without it")
 
 

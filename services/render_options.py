@@ -20,6 +20,7 @@ from schemas.colour import srgb_to_linear
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 from schemas.tail import DENSITY_G, TailName
+from services.options import check_budget, check_bundle
 
 RGB = tuple[float, float, float]
 
@@ -80,11 +81,8 @@ class RenderOptions:
     state: Path = Path(".diaphane")
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.budget) and 0.0 < self.budget <= LIMITS.budget):
-            raise Problem(
-                f"A budget of {self.budget:g} cannot be used.",
-                f"Give a multiple of width x height, above 0 and at most {LIMITS.budget:g}: --budget 2.",
-            )
+        check_budget(self.budget, "--budget 2", self.size)
+        check_bundle(self.bundle, "--bundle")
         if not (math.isfinite(self.g) and 0.0 <= self.g <= 10.0):
             raise Problem(f"--g {self.g} is not between 0 and 10.", "Change that option.")
         for side in (self.image_width, *(self.size or ())):
@@ -104,9 +102,11 @@ def parse_techniques(names: Sequence[str], has_bundle: bool) -> tuple[str, ...]:
         has_bundle: Whether a bundle is given.
 
     Raises:
-        Problem: There is none of that name.
+        Problem: There is none of that name, or nothing but commas is given.
     """
     listed = [part.strip() for name in names for part in name.split(",") if part.strip()]
+    if names and not listed:
+        raise Problem("No technique is named.", f"Choose among: {', '.join((*TECHNIQUES, EVERY))}.")
     found: list[str] = []
     for name in listed or [DEFAULT_TECHNIQUE]:
         if name == EVERY:

@@ -25,6 +25,7 @@ from schemas.colour import display8
 from schemas.problem import ExitCode, Problem
 from schemas.tail import DEFAULT_TAIL
 from services.local_scenes import Chosen, LocalScene, as_usd
+from services.options import check_budget
 from services.progress import Progress
 from services.render_options import RenderOptions
 from services.stages.pictures import write_png
@@ -160,6 +161,7 @@ def _scene(
         frame = scene.start if time is None else None if math.isnan(time) else time
         for chosen in scene.views(options.camera, options.views):
             job = _Job(scene, chosen, frame, size_of(options, chosen.aspect))
+            check_budget(options.budget, "--budget 2", job.size)
             for each in techniques:
                 path = path_of(options, job, each.name)
                 if path in written:
@@ -173,7 +175,7 @@ def _scene(
 def _picture(job: _Job, each: Technique, path: Path, options: RenderOptions, warm: set[str]) -> Picture:
     width, height = job.size
     tail = options.tail or DEFAULT_TAIL
-    budget = Budget(max(1, int(options.budget * width * height)), tail, options.g)
+    budget = Budget(int(options.budget * width * height), tail, options.g)
     about = Picture(
         file=path,
         scene=job.scene.file,

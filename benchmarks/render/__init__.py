@@ -1,1 +1,1 @@
-"""Measurements of the renderer: capture, techniques, reuse of an uploaded scene."""
+"""Measurements of the renderer: capture, reuse of an uploaded scene, the price of learning."""

@@ -9,26 +9,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks.render.setup import Subject, in_turns
-from labeller.curves import error_curves
-from labeller.rules import allocate_curves
-from renderer import metrics
 from renderer.capture import capture
 from renderer.fragment_list import KEY_BYTES, PLACE_BYTES
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.hidden import hidden_fragments
-from renderer.techniques import (
-    TECHNIQUES,
-    Budget,
-    KBufferDeep,
-    KBufferImportance,
-    Needs,
-    Rendered,
-    Technique,
-    technique,
-)
-from schemas.colour import display8
-from schemas.view import View
+from renderer.techniques import Budget, KBufferDeep, KBufferImportance, Technique
 
 SIZE = (1430, 960)
 FACTOR = 2
@@ -110,43 +96,6 @@ def learned_cost(subject: Subject, bundle: Path, rounds: int) -> dict[str, Any]:
         "ratio": {name: times[name]["median"] / base["median"] for name in made if name != "importance"},
         "passes": {name: _medians(found[1:]) for name, found in passes.items()},
     }
-
-
-def every_technique(subject: Subject, bundle: Path | None, rounds: int, names: list[str]) -> list[dict[str, Any]]:
-    """Time, memory and error of every technique on one view, F = 2 W H."""
-    view = subject.views[0]
-    dump = capture(Frame(subject.gpu, view, *SIZE)).dump
-    budget = Budget(FACTOR * dump.pixels)
-    optimum = allocate_curves(dump, error_curves(dump), [budget.fragments], "optimal")[0].k
-    needs = Needs(bundle=bundle, allocate=lambda *_: np.asarray(optimum, dtype=np.int32))
-    exact = display8(technique("sbuffer").render(Frame(subject.gpu, view, *SIZE), budget).linear)
-    rows = []
-    for name in names:
-        if name == "kbuffer-deep" and bundle is None:
-            continue
-        found = [_one(subject.gpu, view, name, needs, budget) for _ in range(rounds + 1)][1:]
-        last = found[-1]
-        rows.append(
-            {
-                "scene": subject.name,
-                "technique": name,
-                "family": TECHNIQUES[name].family,
-                "total_ms": float(np.median([r.milliseconds for r in found])),
-                "passes": _medians([r.passes for r in found]),
-                "pool_bytes": last.pool_bytes,
-                "pixel_bytes": last.pixel_bytes,
-                "total_bytes": last.total_bytes,
-                "captured": last.captured,
-                "mse": metrics.mse(display8(last.linear), exact),
-                "flip": metrics.flip(display8(last.linear), exact)[0],
-                "skips": dict(last.skips),
-            }
-        )
-    return rows
-
-
-def _one(gpu: GpuScene, view: View, name: str, needs: Needs, budget: Budget) -> Rendered:
-    return technique(name, needs).render(Frame(gpu, view, *SIZE), budget)
 
 
 def _medians(passes: list[dict[str, float]]) -> dict[str, float]:

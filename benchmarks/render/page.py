@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from renderer.techniques import TECHNIQUES
-
 
 def page(found: Mapping[str, Any]) -> str:
     """Markdown of what `benchmarks.renderer` measured."""
@@ -14,10 +12,11 @@ def page(found: Mapping[str, Any]) -> str:
     parts = [
         "# The renderer, measured\n",
         f"{found['driver']}. {found['created']}; load average {before:.1f} before and {after:.1f} after. "
-        "1430x960, milliseconds on the wall clock, medians of rounds in which everything takes its turn.\n",
+        "1430x960, milliseconds on the wall clock, medians of rounds in which everything takes its turn. "
+        "All techniques against each other, on more scenes: [BENCH.md](BENCH.md).\n",
         f"```\n{found['command']}\n```\n",
     ]
-    sections = {"capture": _capture, "views": _views, "learned": _learned, "techniques": _techniques}
+    sections = {"capture": _capture, "views": _views, "learned": _learned}
     parts += [write(found[name]) for name, write in sections.items() if found.get(name)]
     return "\n".join(parts)
 
@@ -92,32 +91,6 @@ def _learned(rows: list[dict[str, Any]]) -> str:
     return (
         "## The price of learning\n\n`kbuffer-deep` minus `kbuffer-importance` at F = 2 W H: features, inference and "
         f"lambda against one importance map.\n\n{table}"
-    )
-
-
-def _techniques(rows: list[dict[str, Any]]) -> str:
-    order = list(TECHNIQUES)
-    table = _table(
-        ("scene", "technique", "ms", "pool MiB", "B/pixel", "total MiB", "MSE x1e-5", "FLIP", "passes"),
-        (
-            (
-                r["scene"],
-                r["technique"],
-                _ms(r["total_ms"]),
-                f"{r['pool_bytes'] / 2**20:.1f}",
-                str(r["pixel_bytes"]),
-                f"{r['total_bytes'] / 2**20:.1f}",
-                f"{1e5 * r['mse']:.3g}",
-                f"{r['flip']:.4f}",
-                _passes(r["passes"]),
-            )
-            for r in sorted(rows, key=lambda r: (r["scene"] != "thicket", order.index(r["technique"])))
-        ),
-    )
-    return (
-        "## Every technique\n\nBounded ones at F = 2 W H with the density tail. Against the exact picture, 8-bit "
-        "sRGB. On a software driver every pass over triangles costs processor time; on a GPU the order is another."
-        f"\n\n{table}"
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from renderer.frame import Frame
 from renderer.techniques.base import Budget, Rendered
-from renderer.techniques.ordered import render_ordered
+from renderer.techniques.ordered import check_nodes, render_ordered
 
 
 class Adaptive:
@@ -26,13 +26,16 @@ class Adaptive:
 
     Args:
         nodes: Nodes of the visibility function, 2..16.
+
+    Raises:
+        Problem: `nodes` is out of range.
     """
 
     name = "adaptive"
 
     def __init__(self, nodes: int = 8) -> None:
-        self._nodes = nodes
+        self._nodes = check_nodes(self.name, nodes, least=2)
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame. `budget` is not used: the nodes are the budget."""
-        return render_ordered(frame, self.name, self._nodes, least=2)
+        return render_ordered(frame, self.name, self._nodes)

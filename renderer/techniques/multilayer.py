@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from renderer.frame import Frame
 from renderer.techniques.base import Budget, Rendered
-from renderer.techniques.ordered import render_ordered
+from renderer.techniques.ordered import check_nodes, render_ordered
 
 
 class Multilayer:
@@ -24,13 +24,16 @@ class Multilayer:
 
     Args:
         nodes: Layers a pixel, 1..16.
+
+    Raises:
+        Problem: `nodes` is out of range.
     """
 
     name = "multilayer"
 
     def __init__(self, nodes: int = 4) -> None:
-        self._nodes = nodes
+        self._nodes = check_nodes(self.name, nodes, least=1)
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame. `budget` is not used: the layers are the budget."""
-        return render_ordered(frame, self.name, self._nodes, least=1)
+        return render_ordered(frame, self.name, self._nodes)

@@ -77,27 +77,39 @@ def capture_ordered(frame: Frame) -> Ordered:
     return Ordered(offsets, packed, depth, rank, {**frame.passes("opaque", "count"), **clock.passes})
 
 
-def render_ordered(frame: Frame, technique: str, nodes: int, least: int) -> Rendered:
+def check_nodes(technique: str, nodes: int, least: int) -> int:
+    """The nodes themselves, if the technique can work with them.
+
+    Args:
+        technique: Its name.
+        nodes: Nodes a pixel.
+        least: Fewest with which it works.
+
+    Raises:
+        Problem: They are out of range.
+    """
+    if not least <= nodes <= MAX_NODES:
+        raise Problem(
+            f"{technique} cannot work with {nodes} nodes a pixel.", f"Ask for {least} up to {MAX_NODES} nodes."
+        )
+    return nodes
+
+
+def render_ordered(frame: Frame, technique: str, nodes: int) -> Rendered:
     """Capture in the order of submission, then composite each pixel's run with a fixed number of nodes.
 
     Args:
         frame: The view.
         technique: Its name: `<technique>/resolve.frag` composites, with NODES defined.
-        nodes: Nodes a pixel.
-        least: Fewest nodes with which the technique works.
+        nodes: Nodes a pixel, see `check_nodes`.
 
     Returns:
         The picture. `pool_bytes` are those of the captured fragments of the whole window; above the limit of a storage
         buffer, bands of rows use one part of that size after the other.
 
     Raises:
-        Problem: `nodes` is out of range, a pixel has more fragments than a shader can loop over, or one row more than a
-            storage buffer holds.
+        Problem: A pixel has more fragments than a shader can loop over, or one row more than a storage buffer holds.
     """
-    if not least <= nodes <= MAX_NODES:
-        raise Problem(
-            f"{technique} cannot work with {nodes} nodes a pixel.", f"Ask for {least} up to {MAX_NODES} nodes."
-        )
     ordered = capture_ordered(frame)
     clock = Clock(frame.ctx)
 

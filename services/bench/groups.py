@@ -159,11 +159,15 @@ def said_budget(key: CellKey) -> str:
 
 def said_technique(key: CellKey) -> str:
     """Technique with its tail, where that is not the default."""
+    tail = said_tail(key)
+    return key.technique if tail in ("", DEFAULT_TAIL) else f"{key.technique} ({tail})"
+
+
+def said_tail(key: CellKey) -> str:
+    """Tail of a cell, with its g where that is not the default; '' where there is none."""
     if key.tail is None:
-        return key.technique
-    steep = "" if key.g is None or key.g == DENSITY_G else f" g = {key.g:g}"
-    plain = key.tail == DEFAULT_TAIL and not steep
-    return key.technique if plain else f"{key.technique} ({key.tail}{steep})"
+        return ""
+    return key.tail if key.g is None or key.g == DENSITY_G else f"{key.tail} g = {key.g:g}"
 
 
 def measured(rows: Iterable[Row], basis: str) -> list[Row]:

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from renderer.techniques import Needs
+from renderer.techniques import TECHNIQUES, Needs, technique
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 from schemas.tail import DEFAULT_TAIL, DENSITY_G, TailName
-from services.options import parse_size, parse_tail
+from services.options import check_budget, check_bundle, parse_size, parse_tail
 
 AUTHORED = "authored"
 """The word for the materials' own opacity."""
@@ -85,18 +85,18 @@ class BenchOptions:
                 raise Problem(f"{names.count(name)} scenes are called {name}.", "Give each file a name of its own.")
         if not 1 <= len(self.budgets) <= LIMITS.budgets:
             raise Problem(f"{len(self.budgets)} budgets are not possible.", f"Give 1 to {LIMITS.budgets}.")
-        for budget in self.budgets:
-            if not (math.isfinite(budget) and 0.0 < budget <= LIMITS.budget):
-                raise Problem(
-                    f"A budget of {budget:g} cannot be used.",
-                    f"Give multiples of width x height, above 0 and at most {LIMITS.budget:g}: --budgets 1,2,4.",
-                )
         for side in (side for size in self.sizes for side in size):
             if not LIMITS.min_side <= side <= LIMITS.max_side:
                 raise Problem(
                     f"{side} pixels are no side of a picture here.",
                     f"Give {LIMITS.min_side} to {LIMITS.max_side} pixels.",
                 )
+        for width, height in self.sizes:
+            if width * height > LIMITS.pixels:
+                raise Problem(f"--size {width}x{height} is too large.", f"Give at most {LIMITS.pixels:,} pixels.")
+        smallest = min(self.sizes, key=lambda size: size[0] * size[1])
+        for budget in self.budgets:
+            check_budget(budget, "--budgets 1,2,4", smallest)
         if not (math.isfinite(self.g) and 0.0 <= self.g <= 10.0):
             raise Problem(f"--g {self.g} is not between 0 and 10.", "Change that option.")
         _in_range("--repeats", self.repeats, 1, MOST_REPEATS)
@@ -105,8 +105,12 @@ class BenchOptions:
             _in_range("--path", self.path, 2, MOST_FRAMES)
         if not (math.isfinite(self.limit) and self.limit > 0.0):
             raise Problem(f"--limit {self.limit} is no time.", "Give seconds, above 0.")
+        check_bundle(self.bundle, "--bundle")
         if "kbuffer-deep" in self.techniques and self.bundle is None:
             raise Problem("kbuffer-deep needs a bundle.", "Name one with --bundle, or leave the technique out.")
+        for name in self.techniques:
+            if TECHNIQUES[name].family == "approximate":
+                technique(name, self.needs)  # refuses nodes and samples that it cannot work with
 
 
 def parse_budgets(text: str) -> tuple[float, ...]:

@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-from services.bench.groups import Group, Row, measured, said_technique
+from services.bench.groups import Group, Row, measured, said_tail, said_technique
 from services.report.charts import pareto_front
 
 SCHEMA: Final = "https://vega.github.io/schema/vega-lite/v5.json"
 _PANEL = {"width": 420, "height": 300}
 _COLUMNS = 2
+_POINT = {"type": "point", "filled": True, "size": 70, "opacity": 1.0}
+_COLOUR = {"field": "name", "type": "nominal", "title": "technique", "scale": {"scheme": "tableau20"}}
+"""A colour for each technique, whatever its tail: there are fewer of them than colours."""
+_SHAPE = {"field": "tail", "type": "nominal", "title": "tail"}
+"""Tells the tails of a technique apart."""
 
 
 def specifications(groups: Sequence[Group]) -> dict[str, dict[str, Any]]:
@@ -33,23 +38,22 @@ def specifications(groups: Sequence[Group]) -> dict[str, dict[str, Any]]:
 def _against(
     groups: Sequence[Group], field: str, axis: str, cost: Callable[[Row], float | None], title: str
 ) -> dict[str, Any]:
-    """Points of all techniques, those of one technique joined, and the Pareto front of what a renderer can run."""
+    """Points of all techniques, those of one technique and tail joined, and the front of what a renderer can run."""
     points = [point for group in groups for point in _points(group, field, cost)]
     x = {"field": field, "type": "quantitative", "scale": {"type": "log"}, "title": axis}
     y = {"field": "mse", "type": "quantitative", "scale": {"type": "log"}, "title": "MSE ×1e-5"}
-    technique = {"field": "technique", "type": "nominal", "title": None, "scale": {"scheme": "tableau20"}}
     has_error = {"filter": "datum.mse != null"}
     layers = [
         {
             "transform": [has_error],
             "mark": {"type": "line", "opacity": 0.4},
-            "encoding": {"x": x, "y": y, "color": technique},
+            "encoding": {"x": x, "y": y, "color": _COLOUR, "detail": {"field": "tail"}},
         },
         {
             # An error of 0 has no place on a logarithmic axis: what is exact is a line at its cost.
             "transform": [{"filter": "datum.family == 'exact'"}],
             "mark": {"type": "rule", "opacity": 0.6},
-            "encoding": {"x": x, "color": technique, "tooltip": [{"field": "technique"}, {"field": field}]},
+            "encoding": {"x": x, "color": _COLOUR, "tooltip": [{"field": "technique"}, {"field": field}]},
         },
         {
             "transform": [{"filter": "datum.front"}],
@@ -58,12 +62,12 @@ def _against(
         },
         {
             "transform": [has_error],
-            "mark": {"type": "point", "filled": True, "size": 70},
+            "mark": _POINT,
             "encoding": {
                 "x": x,
                 "y": y,
-                "color": technique,
-                "shape": {"field": "family", "type": "nominal", "title": None},
+                "color": _COLOUR,
+                "shape": _SHAPE,
                 "tooltip": [{"field": name} for name in ("technique", "budget", field, "mse", "score")],
             },
         },
@@ -94,19 +98,18 @@ def _bars(groups: Sequence[Group]) -> dict[str, Any]:
     """DHOIT's Figure 6: squared error of the bounded techniques, a row for each budget."""
     shown = [(group, row) for group in groups for row in _shown(group)]
     values = [_about(group, row) for group, row in shown if row.key.basis == "fragments"]
-    technique = {"field": "technique", "type": "nominal", "sort": None, "title": None}
     mse = {"field": "mse", "type": "quantitative", "scale": {"type": "log"}, "title": "MSE ×1e-5"}
     return {
         "$schema": SCHEMA,
         "title": "Squared error within budgets (DHOIT, Fig. 6)",
         "data": {"values": values},
-        "mark": {"type": "point", "filled": True, "size": 70},
+        "mark": _POINT,
         "encoding": {
             "row": {"field": "budget", "type": "nominal", "title": "F / WH"},
             "x": {"field": "group", "type": "nominal", "sort": None, "title": None},
             "y": mse,
-            "color": technique,
-            "shape": technique,
+            "color": _COLOUR,
+            "shape": _SHAPE,
             "tooltip": [{"field": name} for name in ("group", "technique", "budget", "mse", "score")],
         },
     }
@@ -121,6 +124,8 @@ def _about(group: Group, row: Row) -> dict[str, Any]:
     return {
         "group": group.title,
         "technique": said_technique(row.key),
+        "name": row.key.technique,
+        "tail": said_tail(row.key) or "none",
         "family": row.family,
         "budget": row.key.budget_factor,
         "mse": None if row.mse is None else 1e5 * row.mse,

@@ -114,7 +114,9 @@ def run(arguments: Sequence[str]) -> int:
         state = Path(os.environ.get(STATE_VARIABLE, DEFAULT_STATE))
         return output.show_problem(output.unexpected(error, state), as_json=as_json)
     if status == ExitCode.INTERRUPTED:
-        stopped = Problem("Stopped.", f"Continue with: {shlex.join(['diaphane', *arguments])}", ExitCode.INTERRUPTED)
+        # A benchmark that began afresh would throw away what it has measured until now.
+        again = shlex.join(["diaphane", *(argument for argument in arguments if argument != "--fresh")])
+        stopped = Problem("Stopped.", f"Continue with: {again}", ExitCode.INTERRUPTED)
         return output.show_problem(stopped, as_json=as_json)
     return status
 

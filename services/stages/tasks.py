@@ -36,7 +36,7 @@ _SOURCES: Mapping[StageName, tuple[str, ...]] = {
     ),
     "train": (
         *(f"trainer.{name}" for name in ("adam", "checkpoint", "config", "dataset", "evaluate", "heads", "loss")),
-        *(f"trainer.{name}" for name in ("models", "paper", "sgd", "train", "views", "weights")),
+        *(f"trainer.{name}" for name in ("models", "paper", "segments", "sgd", "train", "views", "weights")),
         "services.stages.train",
     ),
     "export": (

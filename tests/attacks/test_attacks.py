@@ -89,7 +89,7 @@ UNWRITTEN_SLUGS = {"line-break": "scene-file-name", "root-missing": "scene-damag
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Results]:
+def results(tmp_path_factory: pytest.TempPathFactory, kernels: Path) -> Iterator[Results]:
     """What became of every upload, in every mode."""
     home = tmp_path_factory.mktemp("attacks")
     watched = [_canary(Path(make.CANARY))]
@@ -120,8 +120,6 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Results]:
     file = home / "cases.json"
     file.write_text(json.dumps({"cases": cases, "watched": list(map(str, watched)), "port": make.PORT}))
     # One thread: a fork has one, and all that a process had before it is shut in is shut in.
-    kernels = home / "numba"
-    kernels.mkdir()
     threads = {"OPENBLAS_NUM_THREADS": "1", "PXR_WORK_THREAD_LIMIT": "1"}
     environment = {**os.environ, **threads, "NUMBA_CACHE_DIR": str(kernels)}
     done = subprocess.run(

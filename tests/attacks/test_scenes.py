@@ -33,14 +33,12 @@ def _size(folder: Path) -> int:
 
 
 @pytest.mark.skipif(not (SCENES / "MANIFEST.json").exists(), reason="there are no scenes beside the repository")
-def test_scenes_that_hold_all_they_need_are_accepted(tmp_path: Path) -> None:
+def test_scenes_that_hold_all_they_need_are_accepted(tmp_path: Path, kernels: Path) -> None:
     cases = [
         {"name": folder, "folder": str(SCENES / folder), "root": root, "mode": "whole", "seconds": 60.0}
         for folder, root in _roots()
     ]
     (tmp_path / "cases.json").write_text(json.dumps({"cases": cases, "watched": [], "port": make.PORT + 1}))
-    kernels = tmp_path / "numba"
-    kernels.mkdir()
     done = subprocess.run(
         [sys.executable, str(HERE / "runner.py"), str(tmp_path / "cases.json")],
         capture_output=True,

@@ -142,12 +142,10 @@ def test_passes_bytes_and_skips_are_reported__technique(frame: Frame, dump: Frag
     assert rendered.skips["empty tiles"] > 0
 
 
-@pytest.mark.parametrize(
-    "technique", [Multilayer(0), Multilayer(17), Adaptive(1)], ids=["no layer", "17 layers", "one node"]
-)
-def test_nodes_out_of_range_are_a_problem__technique(frame: Frame, technique: Technique) -> None:
-    with pytest.raises(Problem, match="nodes a pixel"):
-        technique.render(frame, Budget(0))
+@pytest.mark.parametrize(("made", "nodes"), [(Multilayer, 0), (Multilayer, 17), (Adaptive, 1), (Adaptive, 17)])
+def test_nodes_out_of_range_are_a_problem(made: type[Multilayer | Adaptive], nodes: int) -> None:
+    with pytest.raises(Problem, match=f"{nodes} nodes a pixel"):
+        made(nodes)
 
 
 def test_a_run_too_long_for_the_shaders_is_a_problem(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:

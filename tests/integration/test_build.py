@@ -41,6 +41,7 @@ def options(
         "budgets": (1.0, 2.0),
         "width": 176,
         "height": 118,
+        "views_per_scene": 2,
         "steps": 200,
         "state": state,
     }
@@ -103,7 +104,7 @@ def test_the_data_set_can_be_copied_and_read_by_itself(built: BuildResult, state
     assert {entry.asset for entry in dataset.index.shards if entry.split == "held-out"} == {"voxel_town"}
     trained = list(dataset.shards("train"))
     assert {entry.asset for entry, _ in trained} == {"nested_shells", "torus_knots"}
-    assert len(trained) == 6
+    assert len(trained) == 4
     for entry, shard in trained:
         assert dataset.check(entry).segments == shard.segments > 0
         assert entry.source.camera.name == entry.source.view
@@ -125,7 +126,7 @@ def test_same_command_again_does_nothing(built: BuildResult, samples: Path, stat
     again = build(options(samples, state), SilentProgress())
     assert not again.worked
     assert again.registry.reference == built.registry.reference
-    assert again.skipped["views already captured"] == 9
+    assert again.skipped["views already captured"] == 6
 
 
 def test_an_added_scene_is_the_only_one_rendered_and_labelled(built: BuildResult, samples: Path, state: Path) -> None:
@@ -134,8 +135,8 @@ def test_an_added_scene_is_the_only_one_rendered_and_labelled(built: BuildResult
     before = {stage: len(list((store / stage).glob("*/*"))) for stage in ("render", "label")}
     result = build(more, SilentProgress())
     after = {stage: len(list((store / stage).glob("*/*"))) for stage in ("render", "label")}
-    assert {stage: after[stage] - before[stage] for stage in before} == {"render": 3, "label": 3}
-    assert result.skipped["baseline pictures already rendered"] == 3
+    assert {stage: after[stage] - before[stage] for stage in before} == {"render": 2, "label": 2}
+    assert result.skipped["baseline pictures already rendered"] == 2
     assert result.registry.reference == "small@1.1.0"
     assert {entry.asset for entry in open_dataset(result.dataset).index.shards} >= {"bottles", "voxel_town"}
 
@@ -150,8 +151,8 @@ def test_interrupted_build_continues(samples: Path, tmp_path: Path, monkeypatch:
         with pytest.raises(KeyboardInterrupt):
             build(wanted, SilentProgress())
     result = build(wanted, SilentProgress())
-    assert result.skipped["views already captured"] == 6
-    assert result.skipped["views already labelled"] == 6
+    assert result.skipped["views already captured"] == 4
+    assert result.skipped["views already labelled"] == 4
 
 
 def test_budget_beyond_all_fragments_is_exact_and_says_so(samples: Path, tmp_path: Path) -> None:
@@ -166,8 +167,8 @@ def test_budget_beyond_all_fragments_is_exact_and_says_so(samples: Path, tmp_pat
         assert m.mse == 0.0
         assert m.skipped is not None
         assert "exact" in m.skipped
-    assert result.skipped["budgets that hold all fragments of a view"] == 6
-    assert result.skipped["budgets given more than once"] == 6
+    assert result.skipped["budgets that hold all fragments of a view"] == 4
+    assert result.skipped["budgets given more than once"] == 4
     for what in ("pixels that k_min covers", "pixels already exact at k_min"):
         assert result.skipped[what] > 0
         assert what in result.report.read_text(encoding="utf-8")

@@ -179,6 +179,14 @@ def test_the_state_folder_comes_from_the_environment(
         (["build", "nowhere.usda", "--name", "glass"], ExitCode.NOT_FOUND, "no file nowhere.usda"),
         ([*BUILD, "--budgets", "0"], ExitCode.USAGE, "A budget of 0 "),
         ([*BUILD, "--budgets", "one"], ExitCode.USAGE, "not a list of numbers"),
+        ([*BUILD, "--budgets", "1e-9"], ExitCode.USAGE, "less than one fragment of a picture of 1430x960 pixels"),
+        ([*BUILD, "--from", ""], ExitCode.USAGE, "--from is empty"),
+        ([*BUILD, "--steps", "1000000000000"], ExitCode.USAGE, "is not 1..1000000"),
+        (["bench", "bottles.usda", "-o", "out", "--budgets", "1e-9"], ExitCode.USAGE, "less than one fragment"),
+        (["bench", "bottles.usda", "-o", "out", "--bundle", ""], ExitCode.USAGE, "--bundle is empty"),
+        (["render", "bottles.usda", "--bundle", ""], ExitCode.USAGE, "--bundle is empty"),
+        (["render", "bottles.usda", "-t", ""], ExitCode.USAGE, "No technique is named"),
+        (["render", "bottles.usda", "--size", "64x48", "--budget", "1e-9"], ExitCode.USAGE, "less than one fragment"),
         ([*BUILD, "--size", "big"], ExitCode.USAGE, "is not a size"),
         ([*BUILD, "--alpha", "2"], ExitCode.USAGE, "--alpha 2.0"),
         ([*BUILD, "--alpha", "much"], ExitCode.USAGE, "'--alpha'"),
@@ -284,7 +292,9 @@ def test_models_are_listed_shown_promoted_and_rolled_back(folder: Path, capsys: 
 
 def test_a_real_interrupt_ends_with_130(tmp_path: Path) -> None:
     code = (
-        "import sys, time, types, services\n"
+        "import signal, sys, time, types, services\n"
+        # A shell's background job begins with interrupts ignored, and hands that on.
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "module = types.ModuleType('services.build')\n"
         "def build(options, progress):\n"
         "    with progress.stage('render', 9):\n"

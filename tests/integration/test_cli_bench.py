@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import moderngl
 import pytest
 
+import services
 from benchmarks import suite
+from benchmarks.comparing.scenes import PATH_FRAMES
 from renderer.samples import SAMPLES
 from schemas.bench import BenchResult
 from schemas.problem import ExitCode
 from services.bench.kept import ROWS
 from services.cli.app import run
 
+ROOT = Path(services.__file__).parent.parent
 FAST = ["--size", "48x32", "--repeats", "1", "--alpha", ".33", "--equal-fragments"]
 
 
@@ -80,11 +87,65 @@ def test_what_was_measured_is_not_measured_again(scene: Path, folder: Path, caps
     assert [cell["technique"] for cell in fresh["views"][0]["cells"]] == ["moment"]
 
 
+def test_a_run_that_was_stopped_keeps_what_was_measured_and_the_next_goes_on(
+    scene: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    alphas = [f"0.{digit}" for digit in range(1, 8)]
+    command = [str(scene), "--size", "48x32", "--repeats", "1", "--equal-fragments", "-t", "sbuffer"]
+    command += ["--alpha", ",".join(alphas), "-o", "out"]
+    kept: list[str] = []
+    for sent, status in (
+        (signal.SIGKILL, -signal.SIGKILL),
+        (signal.SIGINT, ExitCode.INTERRUPTED),
+        (signal.SIGTERM, ExitCode.INTERRUPTED),
+    ):
+        errors = stopped(["bench", *command, *(() if kept else ["--fresh"])], len(kept) + 1, sent, status)
+        lines = (folder / "out" / ROWS).read_text().splitlines(keepends=True)
+        assert [line for line in lines if line.endswith("\n")][: len(kept)] == kept, "nothing is measured twice"
+        kept = [line for line in lines if line.endswith("\n")]
+        if status == ExitCode.INTERRUPTED:
+            (said,) = [line for line in errors if "error:" in line]
+            assert said == "error: Stopped."
+            assert errors[-1].startswith("Continue with: diaphane bench ")
+            assert "--fresh" not in errors[-1]
+        assert "Traceback" not in "".join(errors)
+    result = BenchResult.model_validate(answer(capsys, *command))
+    assert [view.alpha for view in result.views] == [float(alpha) for alpha in alphas]
+    assert (folder / "out" / ROWS).read_text().splitlines(keepends=True)[: len(kept)] == kept
+
+
+def stopped(arguments: list[str], views: int, sent: signal.Signals, status: int) -> list[str]:
+    """Runs a command until so many views are measured, sends a signal then; the lines of its stderr."""
+    # A shell's background job begins with interrupts ignored, and hands that on.
+    heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    code = f"{heard}; from services.cli import main; main({arguments!r})"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    child = subprocess.Popen(
+        [sys.executable, "-c", code],
+        env=environment,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+    )
+    assert child.stderr is not None
+    seen: list[str] = []
+    for line in child.stderr:
+        seen.append(line.rstrip("\n"))
+        if "cells in" in line or "measured already" in line:
+            views -= 1
+            if views == 0:
+                child.send_signal(sent)
+    assert child.wait(timeout=20) == status, seen
+    return seen
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
         (["missing.usda"], ExitCode.NOT_FOUND, "There is no scene missing.usda."),
         (["SCENE", "--budgets", "a"], ExitCode.USAGE, "--budgets has 'a', which is no number."),
+        (["SCENE", "--views", ""], ExitCode.USAGE, ". is not a views file"),
+        (["SCENE", "--camera", ""], ExitCode.NOT_FOUND, "has no camera ''"),
         (["SCENE", "-t", "magic"], ExitCode.NOT_FOUND, "There is no technique 'magic'."),
         (["SCENE", "-t", "kbuffer-deep"], ExitCode.USAGE, "kbuffer-deep needs a bundle."),
         (["SCENE", "--bundle", "."], ExitCode.NOT_FOUND, ". is not a bundle"),
@@ -124,7 +185,7 @@ def test_the_suite_publishes_its_results_and_a_page(
     (lines,) = (folder / "results").glob("bench-*.jsonl")
     result = suite.read_lines(lines)
     assert {(view.scene, view.alpha) for view in result.views} == {("nested_shells", 0.33), ("nested_shells", None)}
-    assert [view.path_frames for view in result.views] == [4, 0]
+    assert [view.path_frames for view in result.views] == [PATH_FRAMES, 0]
     assert all((folder / name).is_file() for name in [f"results/{lines.stem}-figure6-2.svg"])
     assert str(folder) not in lines.read_text() + page
     # It goes on where it was: nothing is measured again.

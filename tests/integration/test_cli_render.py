@@ -291,6 +291,8 @@ def test_a_model_is_converted_inspected_and_rendered(folder: Path, capsys: pytes
         (["render", "panes.usda", "-cam", "nowhere"], ExitCode.NOT_FOUND),
         (["render", "panes.usda", "-t", "kbuffer-deep"], ExitCode.USAGE),
         (["render", "panes.usda", "--size", "20000x20000"], ExitCode.USAGE),
+        (["render", "panes.usda", "--budget", "1e-9"], ExitCode.USAGE),
+        (["render", "panes.usda", "-t", "multilayer", "--nodes", "0"], ExitCode.USAGE),
         (["dump", "panes.usda"], ExitCode.USAGE),
         (["dump", "missing.exr", "-o", "d"], ExitCode.NOT_FOUND),
         (["scene", "inspect", "missing.usda"], ExitCode.NOT_FOUND),

@@ -185,7 +185,7 @@ def test_every_role_that_does_tasks_is_scaled_by_its_queue() -> None:
 
 
 def test_the_queues_are_counted_by_a_user_who_can_do_nothing_else(postgres: Postgres) -> None:
-    url = postgres.new_database()
+    url = postgres.empty_database()
     grants = _block_of_the_readme("create role diaphane_queue")
     from services.database import open_database
 

@@ -75,7 +75,7 @@ def running(postgres: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Ite
     folder, objects, port = tmp_path_factory.mktemp("deployed"), S3Server(), _free_port()
     instead = {
         **objects.environment,
-        "DIAPHANE_DATABASE": postgres.new_database(),
+        "DIAPHANE_DATABASE": postgres.empty_database(),
         "DIAPHANE_STORE": f"s3://{objects.new_bucket()}",
         "DIAPHANE_URL": f"http://127.0.0.1:{port}",
     }
@@ -124,6 +124,7 @@ def test_together_they_build_from_upload_to_published_version(running: Running, 
         (tmp_path / name).write_text(SCENE.format(radius=radius), encoding="utf-8")
         scenes.append(str(tmp_path / name))
     options = ["--name", "tiny", "--size", "64x48", "--budgets", "1", "--alpha", "0.5", "--steps", "20"]
+    options += ["--views-per-scene", "1"]
     submitted = running.cli("jobs", "submit", "build", "--scene", *scenes[:1], "--holdout", scenes[1], *options)
     job = _ended(running, submitted["id"])
     tasks = running.cli("jobs", "tasks", job["id"])["tasks"]

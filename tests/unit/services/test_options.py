@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from schemas.problem import ExitCode, Problem
-from services.options import BuildOptions, default_holdout, parse_budgets, parse_size, parse_tail
+from services.options import BuildOptions, check_budget, default_holdout, parse_budgets, parse_size, parse_tail
 
 
 @pytest.fixture
@@ -31,18 +32,24 @@ def test_budgets_are_sorted_and_unique(scenes: tuple[Path, ...]) -> None:
         ({"budgets": (1.0, -2.0)}, "A budget of -2 "),
         ({"budgets": (float("nan"),)}, "A budget of nan "),
         ({"budgets": (float("inf"),)}, "A budget of inf "),
-        ({"budgets": (1e-9,)}, "less than one fragment"),
+        ({"budgets": (1e-9,)}, "A budget of 1e-09 is less than one fragment of a picture of 1430x960 pixels."),
+        ({"budgets": tuple(float(i) for i in range(1, 18))}, "17 budgets are not possible."),
         ({"alpha": 0.0}, "--alpha 0.0 is not between 0 and 1"),
         ({"alpha": 1.0}, "--alpha 1.0 is not between 0 and 1"),
         ({"alpha": float("nan")}, "--alpha nan"),
         ({"width": 8}, "below 16 pixels"),
-        ({"width": 100000, "height": 1000}, "beyond 33177600 pixels"),
+        ({"width": 16000, "height": 16000}, "beyond 33177600 pixels"),
+        ({"width": 100000, "height": 16}, "beyond 16384 pixels a side"),
         ({"views_per_scene": 0}, "--views-per-scene 0"),
         ({"g": -1.0}, "--g -1.0"),
         ({"g": float("nan")}, "--g nan"),
         ({"seed": -1}, "--seed -1"),
-        ({"steps": 0}, "--steps 0"),
-        ({"patience": -1}, "--patience -1"),
+        ({"steps": 0}, "--steps 0 is not 1..1000000."),
+        ({"steps": -1}, "--steps -1 is not 1..1000000."),
+        ({"steps": 10**12}, "--steps 1000000000000 is not 1..1000000."),
+        ({"patience": -1}, "--patience -1 is not 0..1000000."),
+        ({"start": ""}, "--from is empty."),
+        ({"start": " "}, "--from is empty."),
         ({"replay": Path("datasets/glass")}, "--replay needs --from"),
         ({"name": "Glass!"}, "'Glass!' cannot be the name"),
         ({"holdout": (Path("teapot"),)}, "teapot is not among the scenes"),
@@ -54,6 +61,16 @@ def test_options_out_of_range_are_problems(change: dict[str, Any], words: str, s
         BuildOptions(**{"scenes": scenes, "name": "glass", **change})
     assert words in caught.value.title
     assert caught.value.remedy
+
+
+@pytest.mark.parametrize("size", [(1430, 960), (16, 16), (1, 1), (8191, 3)])
+def test_the_least_budget_that_a_problem_names_can_be_used(size: tuple[int, int]) -> None:
+    with pytest.raises(Problem) as caught:
+        check_budget(0.99 / (size[0] * size[1]), "--budgets 1", size)
+    named = re.search(r"here (\S+) or more", caught.value.remedy)
+    assert named is not None
+    check_budget(float(named[1]), "--budgets 1", size)
+    assert float(named[1]) * size[0] * size[1] < 1.02
 
 
 def test_a_missing_scene_ends_with_not_found(scenes: tuple[Path, ...]) -> None:

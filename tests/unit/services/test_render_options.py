@@ -32,6 +32,12 @@ def test_techniques_come_by_name_in_lists_or_all() -> None:
     assert caught.value.code == ExitCode.NOT_FOUND
 
 
+@pytest.mark.parametrize("names", [("",), (",",), ("", " ")])
+def test_a_technique_without_a_name_is_refused(names: tuple[str, ...]) -> None:
+    with pytest.raises(Problem, match="No technique is named"):
+        parse_techniques(names, False)
+
+
 def test_complexity_is_levels_of_refinement() -> None:
     assert [parse_refine(word, None) for word in ("low", "medium", "high", "veryhigh")] == [0, 1, 2, 3]
     assert (parse_refine(None, None), parse_refine(None, 5)) == (0, 5)
@@ -84,6 +90,8 @@ def test_inference_is_one_of_those_there_are() -> None:
     [
         {"budget": 0.0},
         {"budget": math.nan},
+        {"budget": 1e-9, "size": (320, 200)},
+        {"bundle": ""},
         {"g": -1.0},
         {"image_width": 0},
         {"size": (10, 100_000)},

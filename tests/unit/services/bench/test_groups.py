@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from typing import Any
 from xml.etree import ElementTree
 
 import pytest
@@ -74,6 +75,21 @@ def test_the_front_of_a_plot_is_what_a_renderer_can_run() -> None:
     assert points["moment"]["mse"] == pytest.approx(100.0)
     bars = plots["figure6.vl.json"]["data"]["values"]
     assert {bar["technique"] for bar in bars} == {"kbuffer", "kbuffer-optimal", "kbuffer-importance"}
+
+
+def test_points_tell_techniques_and_their_tails_apart() -> None:
+    tails: list[dict[str, Any]] = [{}, {"g": 0.5}, {"tail": "exact-coverage", "g": None}]
+    cells = [cell(name, **tail) for name in ("kbuffer", "kbuffer-dynamic") for tail in tails]
+    for plot in specifications(groups_of([view(*cells, cell("moment"), cell("sbuffer"))])).values():
+        layers = plot["spec"]["layer"] if "spec" in plot else [plot]
+        (points,) = [layer["encoding"] for layer in layers if layer["mark"]["type"] == "point"]
+        looks: dict[tuple[str, str], set[str]] = {}
+        for datum in plot["data"]["values"]:
+            look = (datum[points["color"]["field"]], datum[points["shape"]["field"]])
+            looks.setdefault(look, set()).add(datum["technique"])
+        assert all(len(shown) == 1 for shown in looks.values())
+        assert {"kbuffer", "kbuffer (density-16 g = 0.5)", "kbuffer (exact-coverage)"} < set().union(*looks.values())
+        assert len({colour for colour, _ in looks if colour.startswith("kbuffer")}) == 2, "one for all of its tails"
 
 
 def test_every_field_of_a_plot_is_in_its_data() -> None:

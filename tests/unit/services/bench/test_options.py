@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from renderer.techniques import Needs
 from schemas.problem import ExitCode, Problem
 from services.bench.options import BenchOptions, parse_alphas, parse_budgets, parse_sizes, parse_tails
 
@@ -25,6 +26,20 @@ def options(tmp_path: Path) -> BenchOptions:
         ({"budgets": (0.0,)}, "A budget of 0 cannot be used."),
         ({"budgets": (float("nan"),)}, "A budget of nan cannot be used."),
         ({"budgets": ()}, "0 budgets are not possible."),
+        (
+            {"budgets": (1e-3, 1.0), "sizes": ((64, 48), (31, 32))},
+            "A budget of 0.001 is less than one fragment of a picture of 31x32 pixels.",
+        ),
+        ({"sizes": ((320, 200), (16000, 16000))}, "--size 16000x16000 is too large."),
+        ({"bundle": ""}, "--bundle is empty."),
+        (
+            {"techniques": ("multilayer", "adaptive"), "needs": Needs(nodes=1)},
+            "adaptive cannot work with 1 nodes a pixel.",
+        ),
+        (
+            {"techniques": ("stochastic",), "needs": Needs(samples=0)},
+            "stochastic cannot work with 0 samples a pixel.",
+        ),
         ({"sizes": ((15, 100),)}, "15 pixels are no side of a picture here."),
         ({"g": -1.0}, "--g -1.0 is not between 0 and 10."),
         ({"repeats": 0}, "--repeats 0 cannot be used."),

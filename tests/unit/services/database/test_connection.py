@@ -5,9 +5,19 @@ from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
+from support.postgres import Postgres
 
 from schemas.problem import Problem
 from services.database import Database, open_database, tables
+
+
+@pytest.fixture(params=["sqlite", "postgresql"])
+def empty_url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """URL of a database without tables."""
+    if request.param == "sqlite":
+        return f"sqlite:///{tmp_path / 'test.sqlite'}"
+    server: Postgres = request.getfixturevalue("postgres")
+    return server.empty_database()
 
 
 def _count(database: Database) -> int:
@@ -29,6 +39,18 @@ def test_a_transaction_is_kept_whole_or_not_at_all(database_url: str) -> None:
     with database.write() as connection:
         connection.execute(tables.aliases.insert().values(name="a", alias="champion", version="1.0.0"))
     assert _count(database) == 1
+
+
+def test_tables_are_made_once_by_whoever_comes_first(empty_url: str) -> None:
+    opened: list[Database] = []
+    threads = [threading.Thread(target=lambda: opened.append(open_database(empty_url))) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert [_count(database) for database in opened] == [0] * len(threads)
+    with opened[0].read() as connection:
+        assert connection.scalars(sa.select(tables.meta.c.value)).all() == [tables.SCHEMA]
 
 
 def test_opening_again_changes_nothing_and_other_tables_are_refused(database_url: str) -> None:
