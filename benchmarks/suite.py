@@ -45,7 +45,9 @@ def main() -> int:
     left_out: list[str] = []
     bundle: str | None = None
     with tempfile.TemporaryDirectory(prefix="diaphane-suite-") as folder:
-        cases = cases_of(arguments.scenes, Path(folder), arguments.only.split(",") if arguments.only else ())
+        every = cases_of(arguments.scenes, Path(folder))
+        whole = len(list(parts_of(every)))
+        cases = [case for case in every if not arguments.only or case.scene in arguments.only.split(",")]
         parts = list(parts_of(cases, arguments.alphas, arguments.sizes))
         for number, part in enumerate(parts if not arguments.page_only else ()):
             start = time.perf_counter()
@@ -56,6 +58,11 @@ def main() -> int:
     if arguments.page_only:
         bundle = next((c.bundle for view in reversed(kept.views) for c in view.cells if c.bundle), None)
     result = result_of(kept, COMMAND, bundle, [plain_path(line) for line in left_out])
+    if len(result.views) < whole * arguments.views and not arguments.quick:
+        missing = (
+            f"The suite has {whole} parts, less those that are opaque as authored; {len(result.views)} are measured."
+        )
+        result = result.model_copy(update={"left_out": (*result.left_out, missing)})
     if not result.views:
         print("Nothing was measured.", file=sys.stderr)
         return 1

@@ -34,18 +34,18 @@ class Part:
     path: int
 
 
-def cases_of(folder: Path, samples: Path, only: Sequence[str]) -> list[Case]:
+def cases_of(folder: Path, samples: Path) -> list[Case]:
     """The suite's scenes that are there.
 
     Args:
         folder: With a MANIFEST.json and the shared scenes; they are left out where it is missing.
         samples: Folder that the project's own scenes are written to.
-        only: Names; empty: all.
     """
     listed = described_cases(folder) if (folder / "MANIFEST.json").is_file() else []
     shared = {case.scene: case for case in listed if case.scene in SHARED}
-    cases = [shared[name] for name in SHARED if name in shared and (not only or name in only)]
-    return cases + [Case(name, write(samples)) for name, write in SAMPLES.items() if not only or name in only]
+    return [shared[name] for name in SHARED if name in shared] + [
+        Case(name, write(samples)) for name, write in SAMPLES.items()
+    ]
 
 
 def parts_of(
