@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Sees to what only the tests need: PostgreSQL's programs, with which the tests start servers of their own; Mesa's zink
 # over its software Vulkan driver, on which they draw every technique a second time; the reference compiler of GLSL; a
-# C and a C++ compiler for the header of deploy/client/c.
+# C and a C++ compiler for the header of deploy/client/c; a browser for the dashboard.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=scripts/common.sh
@@ -26,6 +26,9 @@ if ! have_zink; then
 fi
 if ! command -v glslangValidator >/dev/null; then
     apt_install "the reference compiler of GLSL is missing" glslang-tools
+fi
+if ! command -v chromium >/dev/null && ! command -v google-chrome >/dev/null; then
+    apt_install "the browser of the dashboard's tests is missing" chromium
 fi
 if ! command -v cc >/dev/null || ! command -v g++ >/dev/null; then
     apt_install "a C and a C++ compiler are missing" gcc g++

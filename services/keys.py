@@ -98,12 +98,12 @@ class Keys:
             row = connection.execute(sa.select(table).where(table.c.id == identifier)).mappings().first()
         # As long for an unknown id as for a known one.
         same = hmac.compare_digest(_digest(secret), row["digest"] if row else _NO_DIGEST)
-        now = time.time()
-        if row is None or not same or row["revoked"] is not None or (row["expires"] or now + 1.0) <= now:
-            return None
-        if now - (row["last_used"] or 0.0) > _USED_SECONDS:
-            self._note_use(row["id"], now)
-        return _record(row)
+        return self._used(row) if same else None
+
+    def alive(self, key_id: str) -> KeyRecord | None:
+        """The key of an id, as one that is used now; None if it is unknown, expired or revoked."""
+        with self._database.read() as connection:
+            return self._used(connection.execute(sa.select(table).where(table.c.id == key_id)).mappings().first())
 
     def list(self) -> list[KeyRecord]:
         """All keys, newest first, the revoked ones too."""
@@ -133,6 +133,14 @@ class Keys:
         alive = sa.and_(table.c.revoked.is_(None), sa.or_(table.c.expires.is_(None), table.c.expires > time.time()))
         with self._database.read() as connection:
             return connection.scalar(sa.select(table.c.id).where(alive).limit(1)) is not None
+
+    def _used(self, row: Any) -> KeyRecord | None:
+        now = time.time()
+        if row is None or row["revoked"] is not None or (row["expires"] or now + 1.0) <= now:
+            return None
+        if now - (row["last_used"] or 0.0) > _USED_SECONDS:
+            self._note_use(row["id"], now)
+        return _record(row)
 
     def _note_use(self, key_id: str, now: float) -> None:
         """At most once a minute, so that reading does not become writing; by one of the requests of this process."""

@@ -9,6 +9,7 @@ from importlib.metadata import version
 from anyio import to_thread
 from fastapi import APIRouter, Depends, FastAPI
 
+from services import dashboard
 from services.api import errors
 from services.api.feeds import Feeds
 from services.api.health import Readiness
@@ -16,6 +17,7 @@ from services.api.metrics import Metrics
 from services.api.observe import LOOPBACK, Observe
 from services.api.routes import GUARDED, OPEN, routes, scope_of
 from services.api.security import Guard
+from services.dashboard import OPEN_PAGES, PAGES
 from services.service import Service
 
 THREADS = 48
@@ -38,7 +40,7 @@ def create_app(service: Service, *, hosts: Sequence[str] = LOOPBACK) -> FastAPI:
         redirect_slashes=False,
         lifespan=_lifespan,
     )
-    for route in routes(GUARDED):
+    for route in routes((*GUARDED, *PAGES)):
         scope_of(route)  # a route that forgot to say which scope it needs is found here, not by a stranger
     settings = service.settings
     feeds = Feeds(service.database)
@@ -46,13 +48,16 @@ def create_app(service: Service, *, hosts: Sequence[str] = LOOPBACK) -> FastAPI:
     app.state.feeds = feeds
     app.state.metrics = Metrics(service, feeds)
     app.state.readiness = Readiness(service)
+    app.state.guard = guard = Guard(service.keys, settings.rate, settings.burst)
+    app.state.routers = (*GUARDED, *OPEN, *PAGES, *OPEN_PAGES)
 
-    root = APIRouter(dependencies=[Depends(Guard(service.keys, settings.rate, settings.burst))])
+    root = APIRouter(dependencies=[Depends(guard)])
     for router in GUARDED:
         root.include_router(router)
     app.include_router(root)
     for router in OPEN:
         app.include_router(router)
+    dashboard.install(app, service)
     errors.install(app)
     app.add_middleware(
         Observe, metrics=app.state.metrics, hosts=hosts, window=settings.burst / settings.rate, burst=settings.burst

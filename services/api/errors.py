@@ -75,7 +75,7 @@ def install(app: FastAPI) -> None:
 
     async def handle(request: Request, error: Exception) -> Response:
         if isinstance(error, HTTPException) and error.status_code == 405:
-            allowed = ", ".join(methods_of(request.scope["path"]))
+            allowed = ", ".join(methods_of(request.scope["path"], request.app.state.routers))
             return answer(Refusal("method-not-allowed", headers={"Allow": allowed}), request.scope)
         refusal = refusal_for(error)
         if refusal is None:

@@ -91,6 +91,11 @@ class Feeds:
         """How many listen now."""
         return sum(feed.listeners for feed in self._feeds.values())
 
+    @property
+    def closed(self) -> bool:
+        """Whether streams have to end."""
+        return self._closed
+
     def close(self) -> None:
         """Ends all streams, now and from now on."""
         self._closed = True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator, Callable
 from typing import Annotated
 
 from anyio import to_thread
@@ -150,7 +151,7 @@ async def read_events(
 ) -> EventPage | Response:
     """What happened in a job, as a page or as server-sent events."""
     if "text/event-stream" in accept:
-        return await _stream(request.app.state.feeds, job_id, _last(last_event_id, after))
+        return await stream_events(request.app.state.feeds, job_id, last_number(last_event_id, after))
     await to_thread.run_sync(service.jobs.get, job_id)
     found = await to_thread.run_sync(service.jobs.events, job_id, after, limit + 1)
     items = list(found[:limit])
@@ -160,7 +161,21 @@ async def read_events(
     return EventPage(items=items)
 
 
-async def _stream(feeds: Feeds, job_id: str, after: int) -> Response:
+async def stream_events(
+    feeds: Feeds, job_id: str, after: int, wrap: Callable[[AsyncIterator[bytes]], AsyncIterator[bytes]] | None = None
+) -> Response:
+    """The events of a job as they happen.
+
+    Args:
+        feeds: All feeds.
+        job_id: The job.
+        after: Number of the last event that the listener has.
+        wrap: Put around the source, where the stream may have to end before the job does.
+
+    Raises:
+        Problem: There is no such job.
+        Refusal: Too many listen already.
+    """
     state = await to_thread.run_sync(feeds.state, job_id)
     if state is None:
         raise Problem(f"There is no job {job_id}.", "List the jobs.", ExitCode.NOT_FOUND)
@@ -169,10 +184,16 @@ async def _stream(feeds: Feeds, job_id: str, after: int) -> Response:
         return Response(status_code=204)  # to a browser this says that it need not connect again
     if feeds.listeners >= LISTENERS:
         raise Refusal("unavailable", f"{LISTENERS} listeners are connected already.")
-    return EventStream(feeds.listen(job_id, after, state))
+    source = feeds.listen(job_id, after, state)
+    return EventStream(source if wrap is None else wrap(source))
 
 
-def _last(header: str, after: int) -> int:
+def last_number(header: str, after: int) -> int:
+    """The event that a listener has last: what it says when it connects again, else `after`.
+
+    Raises:
+        Refusal: The header is no number of an event.
+    """
     if not header:
         return after
     if not (header.isascii() and header.isdecimal()) or len(header) > 10 or int(header) > _EVENT:

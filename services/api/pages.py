@@ -48,11 +48,13 @@ class Paging:
 
     Attributes:
         fetch: How many items to ask the database for: one more tells whether there is another page.
+        next: Address of the next page, once `page` was called; None: this is the last.
     """
 
     def __init__(self, request: Request, response: Response, limit: int, cursor: str | None) -> None:
         self._request, self._response, self._cursor = request, response, cursor
         self.limit, self.fetch = limit, limit + 1
+        self.next: str | None = None
 
     def after(self, kind: TypeAdapter[P]) -> P | None:
         """The place that the page begins after; None for the first page.
@@ -80,7 +82,8 @@ class Paging:
             cursor = base64.urlsafe_b64encode(canonical_json(place(items[-1])).encode()).decode()
             query = [(name, value) for name, value in self._request.query_params.multi_items() if name != "cursor"]
             path = self._request.scope["path"]
-            self._response.headers["Link"] = f'<{path}?{urlencode([*query, ("cursor", cursor)])}>; rel="next"'
+            self.next = f"{path}?{urlencode([*query, ('cursor', cursor)])}"
+            self._response.headers["Link"] = f'<{self.next}>; rel="next"'
         return items
 
     def slice(self, found: Sequence[T], name: Callable[[T], str]) -> list[T]:

@@ -1,4 +1,4 @@
-"""All routes: those that need a key, and the few that do not."""
+"""All routes of REST: those that need a key, and the few that do not. Pages are in `services.dashboard`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from services.api import (
     datasets,
     document,
     health,
-    home,
     jobs,
     keys,
     measurements,
@@ -39,7 +38,7 @@ GUARDED: tuple[APIRouter, ...] = (
     workers.router,
     metrics.router,
 )
-OPEN: tuple[APIRouter, ...] = (home.router, health.router, catalogue.router, document.router)
+OPEN: tuple[APIRouter, ...] = (health.router, catalogue.router, document.router)
 
 
 def routes(routers: tuple[APIRouter, ...]) -> Iterator[APIRoute]:
@@ -68,10 +67,10 @@ def body_of(route: APIRoute) -> type[BaseModel] | None:
     return bodies[0].model if bodies else None
 
 
-def methods_of(path: str) -> list[str]:
+def methods_of(path: str, routers: tuple[APIRouter, ...]) -> list[str]:
     """All methods of a path: a router itself knows those of the first route only."""
     found: set[str] = set()
-    for route in routes((*GUARDED, *OPEN)):
+    for route in routes(routers):
         if route.path_regex.match(path):
             found |= set(route.methods or ())
     return sorted(found)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections import OrderedDict
+from collections.abc import Callable
 from typing import Annotated
 
 from fastapi import Depends, Request
@@ -41,16 +42,8 @@ class Guard:
         """
         scheme, _, secret = request.headers.get("authorization", "").partition(" ")
         secret = secret.strip() if scheme.lower() == "bearer" else ""
-        address = request.client.host if request.client else ""
-        name = hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()
-        # An address that was wrong too often is not heard any more, but for keys that were right before: others may
-        # share the address.
-        if name not in self._known:
-            _require(self.failures.take(address, 0.0), "This address sent too many wrong keys.")
-        key = self._keys.authenticate(secret) if secret else None
+        key = self.admit(request, secret, self._keys.authenticate)
         if key is None:
-            self._known.pop(name, None)
-            self.failures.take(address)
             error = ', error="invalid_token"' if secret else ""
             challenge = {"WWW-Authenticate": f'Bearer realm="diaphane"{error}'}
             raise Refusal(
@@ -58,13 +51,37 @@ class Guard:
                 "The key is unknown, expired or revoked." if secret else "The request has no key.",
                 headers=challenge,
             )
+        if request.method in ("GET", "HEAD"):
+            require_scope(key, "read")
+        return key
+
+    def admit(self, request: Request, secret: str, find: Callable[[str], KeyRecord | None]) -> KeyRecord | None:
+        """The key that a secret stands for, also in `request.state.key`; None if it stands for none.
+
+        Args:
+            request: The request.
+            secret: A key's secret or a session's token; empty: none was sent.
+            find: Tells the key of a secret.
+
+        Raises:
+            Refusal: The key, or the address with secrets that stand for none, asks too often.
+        """
+        address = request.client.host if request.client else ""
+        name = hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()
+        # An address that was wrong too often is not heard any more, but for keys that were right before: others may
+        # share the address.
+        if name not in self._known:
+            _require(self.failures.take(address, 0.0), "This address sent too many wrong keys.")
+        key = find(secret) if secret else None
+        if key is None:
+            self._known.pop(name, None)
+            self.failures.take(address)
+            return None
         self._remember(name)
         allowance = self.requests.take(key.id)
         request.state.allowance = allowance
         _require(allowance, f"The key may send {self.requests.rate:g} requests a second on average.")
         request.state.key = key
-        if request.method in ("GET", "HEAD"):
-            require_scope(key, "read")
         return key
 
     def _remember(self, name: str) -> None:

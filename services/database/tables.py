@@ -41,6 +41,15 @@ keys = _table(
 )
 """API keys: a hash of the secret, never the secret."""
 
+sessions = _table(
+    "sessions",
+    sa.Column("digest", sa.Text, primary_key=True),
+    sa.Column("key_id", sa.Text, nullable=False),
+    sa.Column("created", sa.Double, nullable=False),
+    sa.Column("expires", sa.Double, nullable=False, index=True),
+)
+"""Who is signed in to the dashboard: a hash of the browser's token, never the token, and the key that it stands for."""
+
 uploads = _table(
     "uploads",
     sa.Column("id", sa.Text, primary_key=True),

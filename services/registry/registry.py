@@ -276,6 +276,14 @@ class Registry:
             for name, numbers in sorted(published.items())
         ]
 
+    def manifest(self, publication: Publication) -> Manifest:
+        """The manifest of a version.
+
+        Raises:
+            MissingBlob: It is no longer in the store.
+        """
+        return self._manifest(self._row(publication))
+
     def moves(self, name: str) -> list[MoveRecord]:
         """Every move of every alias of a name, oldest first."""
         return history(self._database, check_name(name))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -145,6 +145,38 @@ def _by_step(points: Sequence[tuple[float, float]], what: str, description: str)
     return _svg(frame, [_axes(frame, "step", what), _line(frame, points, "line training")], description)
 
 
+def history_chart(
+    series: Mapping[str, Sequence[float | None]], labels: Sequence[str], worse: Collection[tuple[str, int]], what: str
+) -> str:
+    """Errors (mse x1e-5, log axis) by version, a line for each series; '' with fewer than two versions with values.
+
+    Args:
+        series: Name -> mse of each version; None where there is none.
+        labels: Of the versions, in order.
+        worse: Name and index of the values that are to stand out.
+        what: What a screen reader says.
+    """
+    points = {
+        name: [(float(i), v * 1e5) for i, v in enumerate(values) if v is not None] for name, values in series.items()
+    }
+    heights = [y for line in points.values() for _, y in line]
+    if len({x for line in points.values() for x, _ in line}) < 2:
+        return ""
+    frame = Frame((-0.5, len(labels) - 0.5), _padded_log(heights, 1.8), log_x=False, width=640.0)
+    step = max(1, math.ceil(len(labels) / 10))
+    ticks = [(float(i), label) for i, label in enumerate(labels) if i % step == 0]
+    parts = [_axes(frame, "version", "MSE ×1e-5", ticks)]
+    for name, line in points.items():
+        parts.append(_line(frame, line, "link"))
+        for x, y in line:
+            is_worse = (name, int(x)) in worse
+            mark = _mark("kbuffer-importance" if is_worse else "kbuffer", frame.px(x), frame.py(y))
+            told = f"{name}, {labels[int(x)]}: {number(y)}e-5{', worse than before' if is_worse else ''}"
+            css = "mark worse" if is_worse else "mark"
+            parts.append(f'<g class="{css}">{mark}<title>{escape(told)}</title></g>')
+    return _svg(frame, parts, what)
+
+
 def legend(techniques: Sequence[str]) -> str:
     """Marks and titles of techniques in a row, and what the dashed line and the numbers mean."""
     items = [_key(f"t-{t} mark", 18, _mark(t, 9, 9), title(t)) for t in technique_order(techniques)]
@@ -214,14 +246,16 @@ def _line(frame: Frame, points: Sequence[tuple[float, float]], css: str) -> str:
     return f'<polyline class="{css}" points="{path}"/>'
 
 
-def _axes(frame: Frame, x_label: str, y_label: str) -> str:
+def _axes(frame: Frame, x_label: str, y_label: str, x_ticks: Sequence[tuple[float, str]] | None = None) -> str:
     left, right = frame.left, frame.width - frame.right
     top, bottom = frame.top, frame.height - frame.bottom
     parts = []
-    for value in log_ticks(*frame.x) if frame.log_x else linear_ticks(*frame.x):
+    if x_ticks is None:
+        x_ticks = [(v, _tick(v)) for v in (log_ticks(*frame.x) if frame.log_x else linear_ticks(*frame.x))]
+    for value, text in x_ticks:
         x = frame.px(value)
         parts.append(f'<path class="grid" d="M{x:.1f} {top}V{bottom}"/>')
-        parts.append(_text("tick", "middle", x, bottom + 17, _tick(value)))
+        parts.append(_text("tick", "middle", x, bottom + 17, text))
     for value in log_ticks(*frame.y) if frame.log_y else linear_ticks(*frame.y):
         y = frame.py(value)
         parts.append(f'<path class="grid" d="M{left} {y:.1f}H{right}"/>')

@@ -11,7 +11,7 @@ from schemas.service import SCOPES
 from services.api import application, routes
 from services.api.description import build_document
 
-OPEN = {"/", "/v1/health/live", "/v1/health/ready", "/v1/openapi.json", "/v1/problems", "/v1/problems/{slug}"}
+OPEN = {"/v1/health/live", "/v1/health/ready", "/v1/openapi.json", "/v1/problems", "/v1/problems/{slug}"}
 """The short list of what needs no key."""
 
 PARTS = {

@@ -115,3 +115,19 @@ def test_the_exact_technique_is_a_line_at_its_time() -> None:
     svg = ElementTree.fromstring(charts.error_chart(made, "all"))
     assert [path for path in svg.iter("path") if path.get("class") == "exact"]
     assert not [group for group in svg.iter("g") if group.get("class") == "t-sbuffer"]
+
+
+def test_a_history_marks_what_got_worse_and_leaves_gaps_out() -> None:
+    series = {"<a>": [1e-4, None, 2e-4], "b": [1e-4, 1e-4, 1e-4]}
+    svg = ElementTree.fromstring(charts.history_chart(series, ["1.0.0", "1.1.0", "1.2.0"], {("<a>", 2)}, "errors"))
+    marks = [group for group in svg.iter("g") if (group.get("class") or "").startswith("mark")]
+    worse = [mark.findtext("title") for mark in marks if mark.get("class") == "mark worse"]
+    assert (len(marks), worse) == (5, ["<a>, 1.2.0: 20.0e-5, worse than before"])
+    assert [len((line.get("points") or "").split()) for line in svg.iter("polyline")] == [2, 3]
+    assert {"1.0.0", "1.1.0", "1.2.0"} <= {text.text for text in svg.iter("text")}
+
+
+def test_a_history_of_one_version_makes_no_chart() -> None:
+    assert charts.history_chart({"a": [1e-4]}, ["1.0.0"], set(), "errors") == ""
+    assert charts.history_chart({"a": [1e-4, None]}, ["1.0.0", "1.1.0"], set(), "errors") == ""
+    assert charts.history_chart({}, [], set(), "errors") == ""

@@ -1,0 +1,201 @@
+"""Measurements as the pages compare them: a model over its versions, a version or a scene over techniques."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sqlalchemy as sa
+from markupsafe import Markup
+
+from schemas.measurement import Measurement
+from services import summary
+from services.database import Database
+from services.database.tables import measurements as table
+from services.report import charts
+
+WORSE = 1.05
+"""Error over that of the version before from which a scene counts as worse."""
+
+_MOST_ROWS = 20_000
+
+
+@dataclass(frozen=True, slots=True)
+class VersionError:
+    """The error of a version on a scene.
+
+    Attributes:
+        mse: Geometric mean over views and budgets.
+        ratio: Geometric mean of mse over that of the version before, on the same views and budgets; None: there is no
+            such pair.
+        pairs: How many pairs of view and budget the mean is over.
+    """
+
+    mse: float
+    ratio: float | None
+    pairs: int
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether the scene got worse by more than may be chance."""
+        return self.ratio is not None and self.ratio > WORSE
+
+
+@dataclass(frozen=True, slots=True)
+class SceneHistory:
+    """A scene over versions.
+
+    Attributes:
+        scene: Its label.
+        errors: Of each version; None where it was not measured.
+    """
+
+    scene: str
+    errors: tuple[VersionError | None, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Techniques and budgets over some measurements.
+
+    Attributes:
+        rows: A row for each technique and budget.
+        best: Technique with the least error within a budget, of those that a renderer can run.
+        front: Technique and budget of the rows that no other beats in time and error.
+        legend: Of the charts.
+        time: Time against error.
+        memory: Memory against error.
+    """
+
+    rows: list[summary.Row]
+    best: dict[float, str]
+    front: frozenset[tuple[str, float]]
+    legend: Markup
+    time: Markup
+    memory: Markup
+
+
+def history(database: Database, name: str, versions: Sequence[str]) -> list[SceneHistory]:
+    """Errors of a bundle's own pictures by scene, over versions.
+
+    Args:
+        database: Where they are.
+        name: Of the model.
+        versions: In the order in which they were published.
+    """
+    data = table.c.data
+    shown = [f"{name}@{version}" for version in versions]
+    query = (
+        sa.select(
+            table.c.model,
+            table.c.scene,
+            table.c.scene_digest,
+            table.c.view,
+            table.c.budget_factor,
+            data["budget"].as_integer().label("budget"),
+            data["alpha"].as_float().label("alpha"),
+            data["mse"].as_float().label("mse"),
+        )
+        .where(table.c.model.in_(shown), table.c.technique == summary.BUNDLE, data["exact"].as_boolean().is_(False))
+        .order_by(table.c.id.desc())
+        .limit(_MOST_ROWS)
+    )
+    found: dict[tuple[str, str], dict[str, dict[Any, float]]] = defaultdict(lambda: defaultdict(dict))
+    with database.read() as connection:
+        for row in connection.execute(query):
+            if row.mse is not None:
+                errors = found[row.scene, row.scene_digest][row.model]
+                errors.setdefault((row.view, row.budget_factor, row.budget, row.alpha), max(row.mse, summary.MSE_FLOOR))
+    titles = _titles(found)
+    return [SceneHistory(titles[scene], _compared(found[scene], shown)) for scene in sorted(found)]
+
+
+def history_chart(scenes: Sequence[SceneHistory], versions: Sequence[str]) -> Markup:
+    """The errors as a chart; empty with a single version."""
+    series = {scene.scene: [None if error is None else error.mse for error in scene.errors] for scene in scenes}
+    worse = {(scene.scene, i) for scene in scenes for i, e in enumerate(scene.errors) if e is not None and e.is_worse}
+    return Markup(charts.history_chart(series, versions, worse, "Error of each scene by version"))
+
+
+def of_version(database: Database, reference: str) -> list[Measurement]:
+    """The pictures of a version, and of the techniques without a bundle on the same views.
+
+    Args:
+        database: Where they are.
+        reference: `name@version`.
+    """
+    with database.read() as connection:
+        own = connection.execute(_latest(table.c.model == reference)).all()
+        digests = {row.scene_digest for row in own}
+        others = table.c.model.is_(None) & table.c.scene_digest.in_(digests)
+        baseline = connection.execute(_latest(others)).all() if digests else []
+    views = {_view_key(row) for row in own}
+    return _unique([*own, *(row for row in baseline if _view_key(row) in views)])
+
+
+def compare(measurements: Sequence[Measurement], label: str) -> Comparison:
+    """Rows and charts of some measurements.
+
+    Args:
+        measurements: Of any scenes, views, techniques and budgets, each once.
+        label: What they are of, for the charts.
+    """
+    rows = summary.rows(measurements)
+    runnable = [row for row in rows if row.technique != summary.ORACLE and row.mse is not None]
+    best = {
+        budget: min((row for row in runnable if row.budget_factor == budget), key=lambda row: row.mse or 0.0).technique
+        for budget in {row.budget_factor for row in runnable}
+    }
+    points = {(row.technique, row.budget_factor): (row.ms, row.mse) for row in runnable if row.ms and row.mse}
+    front = set(charts.pareto_front(list(points.values())))
+    return Comparison(
+        rows=rows,
+        best=best,
+        front=frozenset(key for key, point in points.items() if point in front),
+        legend=Markup(charts.legend([row.technique for row in rows if row.mse is not None])),
+        time=Markup(charts.error_chart(rows, label)),
+        memory=Markup(charts.error_chart(rows, label, charts.MEMORY)),
+    )
+
+
+def _latest(condition: sa.ColumnElement[bool]) -> sa.Select[Any]:
+    columns = table.c.id, table.c.artifact, table.c.scene_digest, table.c.view, table.c.model, table.c.data
+    return sa.select(*columns).where(condition).order_by(table.c.id.desc()).limit(_MOST_ROWS)
+
+
+def _view_key(row: Any) -> tuple[Any, ...]:
+    data = row.data
+    return (row.scene_digest, row.view, data["width"], data["height"], data["alpha"], data["tail"])
+
+
+def _unique(rows: Iterable[Any]) -> list[Measurement]:
+    """The first of each technique and budget on a view."""
+    found: dict[Any, Measurement] = {}
+    for row in rows:
+        key = (*_view_key(row), row.data["technique"], row.data["budget_factor"])
+        if key not in found:
+            found[key] = Measurement.model_validate(row.data)
+    return list(found.values())
+
+
+def _titles(scenes: Iterable[tuple[str, str]]) -> dict[tuple[str, str], str]:
+    """Labels; where two scenes have the same, with the beginning of their digest."""
+    labels = [label for label, _ in scenes]
+    return {(label, digest): label if labels.count(label) == 1 else f"{label} {digest[:8]}" for label, digest in scenes}
+
+
+def _compared(errors: dict[str, dict[Any, float]], references: Sequence[str]) -> tuple[VersionError | None, ...]:
+    made: list[VersionError | None] = []
+    before: dict[Any, float] = {}
+    for reference in references:
+        own = errors.get(reference)
+        if not own:
+            made.append(None)
+            continue
+        shared = [own[key] / before[key] for key in own.keys() & before.keys()]
+        mse = summary.geometric_mean(list(own.values())) or 0.0
+        made.append(VersionError(mse, summary.geometric_mean(shared), len(own)))
+        before = own
+    return tuple(made)

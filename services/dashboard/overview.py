@@ -1,0 +1,50 @@
+"""`/`: what runs, what is best, who works, and what did not have to be done."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+
+from schemas.job import FINAL_STATES
+from services.api.parts import Services
+from services.api.streams import EventStream
+from services.dashboard.figures import champions, role_loads, savings
+from services.dashboard.live import Watch, while_signed_in
+from services.dashboard.page import PageRoute, render
+
+router = APIRouter(route_class=PageRoute, include_in_schema=False)
+
+_RUNNING = 20
+_WAITING = 10
+_ENDED = 6
+_CHAMPIONS = 12
+
+
+@router.get("/", response_class=Response)
+def show_overview(request: Request, service: Services) -> Response:
+    """The page."""
+    watch: Watch = request.app.state.watch
+    seen = watch.look()  # before the rest is: what changes meanwhile is told
+    jobs = service.jobs
+    running = [*jobs.list(state="running", limit=_RUNNING), *jobs.list(state="cancelling", limit=_RUNNING)]
+    ended = [job for job in jobs.list(limit=_ENDED + _RUNNING) if job.state in FINAL_STATES]
+    return render(
+        request,
+        "overview",
+        seen=seen,
+        running=running,
+        waiting=jobs.list(state="queued", limit=_WAITING),
+        ended=ended[:_ENDED],
+        roles=role_loads(jobs.queues(), jobs.executors()),
+        champions=champions(service.database, _CHAMPIONS),
+        saved=savings(service.database),
+    )
+
+
+@router.get("/changes", response_class=Response)
+async def stream_changes(request: Request, seen: Annotated[str, Query(pattern=r"^[0-9a-f]{0,16}$")] = "") -> Response:
+    """Server-sent events: something on the page has changed since it was made."""
+    watch: Watch = request.app.state.watch
+    watch.require_room()
+    return EventStream(while_signed_in(request, watch.changes(seen, request.app.state.feeds)))

@@ -1,0 +1,163 @@
+"""Pages: what all of them share, the policy that they obey, and how a problem looks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Coroutine
+from datetime import UTC, datetime
+from functools import cache
+from traceback import format_exception
+from typing import Any
+from urllib.parse import quote
+
+import structlog
+from fastapi import Request, Response
+from fastapi.routing import APIRoute
+from jinja2 import Environment
+from markupsafe import Markup
+
+from schemas.service import JobRecord, KeyRecord, Scope
+from services.api.errors import refusal_for
+from services.dashboard.assets import address
+from services.keys import allows
+from services.problems import Refusal
+from services.report.page import environment
+
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; form-action 'self'; "
+    "base-uri 'none'; frame-ancestors 'none'"
+)
+"""Content-Security-Policy: nothing inline, nothing from elsewhere."""
+
+# Not `no-referrer`: browsers would then hide where a form comes from.
+HEADERS = {"Content-Security-Policy": POLICY, "Referrer-Policy": "same-origin"}
+
+PAGES = (("/", "Overview"), ("/jobs", "Jobs"), ("/models", "Models"), ("/scenes", "Scenes"))
+"""What the navigation leads to."""
+
+_LOCAL = re.compile(r"/(?![/\\])[\x21-\x5b\x5d-\x7e]*")
+_UNITS = ((86400.0, "d"), (3600.0, "h"), (60.0, "min"), (1.0, "s"))
+
+log = structlog.get_logger("diaphane.dashboard")
+
+
+def render(request: Request, template: str, status: int = 200, **values: Any) -> Response:
+    """A page.
+
+    Args:
+        request: The request.
+        template: Name in `templates/dashboard`, without suffixes.
+        status: HTTP status.
+        values: What the template shows.
+    """
+    who: KeyRecord | None = getattr(request.state, "key", None)
+
+    def may(scope: Scope) -> bool:
+        return who is not None and allows(who, scope)
+
+    text = (
+        _environment()
+        .get_template(f"dashboard/{template}.html.j2")
+        .render(who=who, may=may, csrf=getattr(request.state, "csrf", ""), path=request.scope["path"], **values)
+    )
+    return Response(text, status, HEADERS, media_type="text/html")
+
+
+def redirect(to: str) -> Response:
+    """Sends the browser to another page, with GET."""
+    return Response(status_code=303, headers={**HEADERS, "Location": to})
+
+
+def is_local(address_of: str) -> bool:
+    """Whether an address is one of this server's, without a host in it: where a browser may be sent to."""
+    return _LOCAL.fullmatch(address_of) is not None
+
+
+class PageRoute(APIRoute):
+    """A route whose errors are pages, and which sends whoever is not signed in to where one does."""
+
+    def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
+        """The handler, with errors as pages around it."""
+        inner = super().get_route_handler()
+
+        async def handle(request: Request) -> Response:
+            try:
+                return await inner(request)
+            except Exception as error:
+                return _problem_page(request, error)
+
+        return handle
+
+
+def _problem_page(request: Request, error: Exception) -> Response:
+    refusal = refusal_for(error)
+    if refusal is None:
+        log.error("unexpected error", exception="".join(format_exception(error)))
+        refusal = Refusal("internal")
+    if refusal.type.slug == "unauthenticated":
+        return _to_sign_in(request)
+    problem = refusal.document(request_id=request.state.request_id)
+    page = render(request, "problem", refusal.type.status, problem=problem)
+    page.headers.update(refusal.headers)
+    return page
+
+
+def _to_sign_in(request: Request) -> Response:
+    asked = request.url.path + (f"?{request.url.query}" if request.url.query else "")
+    to = "/sign-in"
+    if request.headers.get("hx-request") == "true":  # a part of a page: the whole page has to go
+        return Response(status_code=401, headers={**HEADERS, "HX-Redirect": to})
+    if request.method == "GET" and asked != "/" and is_local(asked):
+        to += f"?next={quote(asked, safe='')}"
+    return redirect(to)
+
+
+@cache
+def _environment() -> Environment:
+    made = environment()
+    made.globals.update(asset=address, pages=PAGES)
+    made.filters.update(when=when, duration=duration, took=_took, percent=_percent, size=_size)
+    return made
+
+
+def when(moment: str | None) -> str:
+    """A time (ISO 8601, UTC): how long ago, and exactly where one points at it."""
+    if moment is None:
+        return "–"
+    time = datetime.fromisoformat(moment)
+    ago = duration((datetime.now(UTC) - time).total_seconds())
+    exact = f"{time:%Y-%m-%d %H:%M:%S} UTC"
+    return Markup('<time datetime="{}" title="{}">{} ago</time>').format(moment, exact, ago)
+
+
+def duration(seconds: float | None) -> str:
+    """Two units of a time at most: `3 h 20 min`."""
+    if seconds is None:
+        return "–"
+    left = max(0.0, seconds)
+    parts: list[str] = []
+    for size, unit in _UNITS:
+        if left >= size or (unit == "s" and not parts):
+            parts.append(f"{int(left // size)} {unit}")
+            left %= size
+    return " ".join(parts[:2])
+
+
+def _took(job: JobRecord) -> str:
+    if job.started is None:
+        return "–"
+    end = datetime.fromisoformat(job.finished) if job.finished else datetime.now(UTC)
+    return duration((end - datetime.fromisoformat(job.started)).total_seconds())
+
+
+def _percent(fraction: float) -> str:
+    return f"{100.0 * fraction:.0f} %"
+
+
+def _size(count: int) -> str:
+    value, unit = float(count), "B"
+    for unit in ("B", "KiB", "MiB", "GiB"):
+        if value < 1024.0 or unit == "GiB":
+            break
+        value /= 1024.0
+    return f"{value:.0f} {unit}" if unit == "B" else f"{value:.1f} {unit}"

@@ -1,0 +1,141 @@
+"""What was measured on a scene: its views, the pictures that are kept, and the certified optimum of a view."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import sqlalchemy as sa
+
+from schemas.measurement import Certificate, Measurement
+from services import summary
+from services.database import Database
+from services.database.tables import measurements as table
+from services.database.tables import tasks
+from services.stages.pictures import stem
+from services.store import MissingArtifact, Store
+from services.tasks import FACTS, Task
+
+_MOST_ROWS = 5_000
+_MOST_LEVEL = 255
+"""Pictures of counts have 8 bits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """A measurement with where its pictures are.
+
+    Attributes:
+        artifact: `evaluate/key`.
+        model: `name@version`; None for techniques without a bundle.
+        measured: What was measured.
+    """
+
+    artifact: str
+    model: str | None
+    measured: Measurement
+
+    @property
+    def stem(self) -> str:
+        """Of its pictures' file names."""
+        return stem(self.measured.technique, self.measured.budget_factor)
+
+    @property
+    def has_pictures(self) -> bool:
+        """Whether it was run, so that its artifact holds pictures."""
+        return self.measured.skipped is None
+
+
+@dataclass(frozen=True, slots=True)
+class SeenView:
+    """A view of the scene at the size that it was measured at last.
+
+    Attributes:
+        name: Of the view.
+        width: Pixels per row.
+        height: Rows.
+        fragments: N, transparent fragments.
+        most: Most of them in a pixel; None where the exact picture was not measured.
+        shots: Latest measurement of each technique and budget.
+    """
+
+    name: str
+    width: int
+    height: int
+    fragments: int
+    most: int | None
+    shots: tuple[Shot, ...]
+
+    @property
+    def exact(self) -> Shot | None:
+        """The picture with all fragments, whose k is the depth complexity."""
+        return next((shot for shot in self.shots if shot.measured.technique == summary.EXACT), None)
+
+    def budgets(self) -> list[float]:
+        """Those that do not hold every fragment."""
+        return sorted({m.budget_factor for m in summary.compared(shot.measured for shot in self.shots)})
+
+    def within(self, budget: float) -> list[Shot]:
+        """Shots with pictures at a budget, in the order of tables."""
+        order = summary.technique_order(shot.measured.technique for shot in self.shots)
+        found = [s for s in self.shots if s.measured.budget_factor == budget and s.has_pictures and s != self.exact]
+        return sorted(found, key=lambda shot: order.index(shot.measured.technique))
+
+    def top(self, shots: Sequence[Shot]) -> int:
+        """Where the scale of k ends for some shots."""
+        return min(_MOST_LEVEL, max([shot.measured.k_max or 1 for shot in shots], default=1))
+
+
+def views(database: Database, digest: str) -> list[SeenView]:
+    """Views of a scene that were measured, by name.
+
+    Args:
+        database: Where measurements are.
+        digest: Of the scene's content.
+    """
+    query = sa.select(table.c.artifact, table.c.model, table.c.data).where(table.c.scene_digest == digest)
+    with database.read() as connection:
+        rows = connection.execute(query.order_by(table.c.id.desc()).limit(_MOST_ROWS)).all()
+    found: dict[str, dict[tuple[str, float], Shot]] = {}
+    setting: dict[str, tuple[Any, ...]] = {}
+    for row in rows:
+        shot = Shot(row.artifact, row.model, Measurement.model_validate(row.data))
+        m = shot.measured
+        key = (m.width, m.height, m.alpha, m.tail)
+        # Other sizes, opacities and tails than the latest cannot be compared with it.
+        if setting.setdefault(m.view, key) == key:
+            found.setdefault(m.view, {}).setdefault((m.technique, m.budget_factor), shot)
+    return [_view(name, list(found[name].values())) for name in sorted(found)]
+
+
+def certificates(database: Database, store: Store, view: SeenView) -> list[Certificate]:
+    """The certified optimum of a view at each budget; none where its labels are not kept any more."""
+    kept = {shot.artifact for shot in view.shots}
+    with database.read() as connection:
+        query = sa.select(tasks.c.task).where(tasks.c.artifact.in_(kept)).limit(2 * len(kept))
+        made = [Task.model_validate(task) for task in connection.scalars(query)]
+    for task in made:
+        label = next((need for need in task.needs if need.startswith("label/")), None)
+        facts = None if label is None else facts_of(store, label)
+        if facts is not None:
+            shown = zip(task.params["factors"], facts["certificates"], strict=True)
+            return [Certificate(scene="", view=view.name, budget_factor=f, **found) for f, found in shown]
+    return []
+
+
+def facts_of(store: Store, artifact: str) -> dict[str, Any] | None:
+    """Facts of an artifact; None if it is gone."""
+    try:
+        found: dict[str, Any] = json.loads(store.read(artifact, FACTS))
+    except (MissingArtifact, FileNotFoundError):
+        return None
+    return found
+
+
+def _view(name: str, shots: list[Shot]) -> SeenView:
+    first = shots[0].measured
+    exact = next((shot.measured for shot in shots if shot.measured.technique == summary.EXACT), None)
+    most = None if exact is None else exact.k_max
+    return SeenView(name, first.width, first.height, first.total_fragments, most, tuple(shots))

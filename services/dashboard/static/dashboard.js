@@ -1,0 +1,88 @@
+// Parts of pages that change, values of charts, and what went wrong. Everything works without this file, but by
+// loading the page again.
+"use strict";
+
+const said = document.getElementById("said");
+const trouble = document.getElementById("trouble");
+
+// A stream tells that something has changed; htmx then fetches that part of the page anew, twice a second at most.
+// A page that is not looked at gives its connection back: a browser has only a few.
+function follow(box) {
+  let source = null;
+  let last = "";
+  let due = 0;
+  const changed = (event) => {
+    last = event.lastEventId || last;
+    due ||= setTimeout(() => {
+      due = 0;
+      htmx.trigger(document.getElementById(box.dataset.part), "refresh");
+    }, 500);
+  };
+  const open = () => {
+    const url = new URL(box.dataset.stream, location.href);
+    if (last) url.searchParams.set("after", last);
+    source = new EventSource(url);
+    for (const kind of ["change", "state", "stage", "task", "log"]) source.addEventListener(kind, changed);
+  };
+  document.addEventListener("visibilitychange", () => {
+    source?.close();
+    if (!document.hidden) open();
+  });
+  if (!document.hidden) open();
+}
+
+document.querySelectorAll("[data-stream]").forEach(follow);
+
+// What a screen reader is told: one sentence, and only when it differs.
+function say(part) {
+  const sentence = part?.dataset?.say;
+  if (sentence && sentence !== said.dataset.last) {
+    if (said.dataset.last) said.textContent = sentence;
+    said.dataset.last = sentence;
+  }
+}
+document.querySelectorAll("[data-say]").forEach(say);
+
+document.addEventListener("htmx:afterSwap", (event) => {
+  say(document.getElementById(event.detail.target.id));
+  trouble.hidden = true;
+});
+for (const kind of ["htmx:responseError", "htmx:sendError"]) {
+  document.addEventListener(kind, (event) => {
+    const status = event.detail.xhr?.status;
+    trouble.textContent = status
+      ? `This page could not be brought up to date: the service answered ${status}. What is shown may be old.`
+      : "This page could not be brought up to date: the service cannot be reached. What is shown may be old.";
+    trouble.hidden = false;
+  });
+}
+
+// The value of the mark in a chart that is pointed at or has the focus; its <title> has it for screen readers.
+const tip = document.createElement("div");
+tip.className = "tip";
+tip.hidden = true;
+document.body.append(tip);
+
+function show(event) {
+  const mark = event.target.closest?.(".mark");
+  const title = mark?.querySelector("title");
+  tip.hidden = !title;
+  if (!title) return;
+  tip.textContent = title.textContent;
+  const place = mark.getBoundingClientRect();
+  const left = Math.min(place.right + 8, document.documentElement.clientWidth - tip.offsetWidth - 8);
+  tip.style.left = `${Math.max(8, left) + scrollX}px`;
+  tip.style.top = `${Math.max(place.top - tip.offsetHeight - 6, 4) + scrollY}px`;
+}
+for (const kind of ["pointerover", "focusin"]) document.addEventListener(kind, show);
+document.addEventListener("keydown", (event) => {
+  if (event.key === "Escape") tip.hidden = true;
+});
+for (const chart of document.querySelectorAll("svg.chart")) {
+  chart.setAttribute("role", "group"); // as an image it would hide its marks
+  for (const mark of chart.querySelectorAll(".mark")) {
+    mark.setAttribute("tabindex", "0");
+    mark.setAttribute("role", "img");
+    mark.setAttribute("aria-label", mark.querySelector("title").textContent);
+  }
+}
