@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -18,6 +19,10 @@ from services.stress.threads import one_thread
 
 Machine = Callable[[str], Storage]
 """Opens one storage as a machine of the given name does."""
+
+# A shell's background job begins with interrupts ignored, and the programs that tests start and interrupt would, too.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # Failing examples are printed as code, so the same examples everywhere cost nothing; a shared machine has no deadline.
 settings.register_profile("diaphane", deadline=None, max_examples=50, derandomize=True, database=None)

@@ -37,7 +37,7 @@ class Listed:
 
 
 SUITES: Final = (
-    Listed("curves", ("curves", "composite", "reference", "transmittance", "csr")),
+    Listed("curves", ("curves", "exponents", "composite", "reference", "transmittance", "csr")),
     Listed("allocations", ("hull", "selection", "greedy", "increment", "limits", "bands", "optimal")),
     Listed("fills", ("fill", "sum")),
     Listed("features", ("features",)),

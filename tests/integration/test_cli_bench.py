@@ -116,9 +116,7 @@ def test_a_run_that_was_stopped_keeps_what_was_measured_and_the_next_goes_on(
 
 def stopped(arguments: list[str], views: int, sent: signal.Signals, status: int) -> list[str]:
     """Runs a command until so many views are measured, sends a signal then; the lines of its stderr."""
-    # A shell's background job begins with interrupts ignored, and hands that on.
-    heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
-    code = f"{heard}; from services.cli import main; main({arguments!r})"
+    code = f"from services.cli import main; main({arguments!r})"
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     child = subprocess.Popen(
         [sys.executable, "-c", code],

@@ -77,8 +77,9 @@ def main(folder: Path, points: int) -> None:
     shutil.copytree(folder / "before", bundles)
     assert traced_pull(bundles, 0, folder / "lines") == 0
     lines = int((folder / "lines").read_text())
-    drawn = random.Random(7)
-    for line in sorted(drawn.sample(range(1, lines + 1), points)):
+    drawn, late = random.Random(7), lines - lines // 10  # the new version is seen near the end
+    early_lines = drawn.sample(range(1, late), points - points // 2)
+    for line in sorted([*early_lines, *drawn.sample(range(late, lines + 1), points // 2)]):
         shutil.rmtree(bundles)
         shutil.copytree(folder / "before", bundles)
         ended = traced_pull(bundles, line)
