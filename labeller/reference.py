@@ -20,6 +20,7 @@ from schemas.tail import (
     DENSITY_G,
     MAX_EXPONENT,
     OPTICAL_UNIT,
+    PLAIN_SHARE,
     ROOT_SHARE,
     SHARE_LEVELS,
     MetricName,
@@ -113,7 +114,7 @@ def depth_bins(
     z = depth.astype(np.float32)
     extent = z[-1] - z[0]
     x = (z - z[0]) / extent if extent > 0.0 else np.zeros_like(z)
-    y = (np.float32(1.0 - ROOT_SHARE) * x + np.float32(ROOT_SHARE) * np.sqrt(x)) * np.float32(bins)
+    y = (np.float32(PLAIN_SHARE) * x + np.float32(ROOT_SHARE) * np.sqrt(x)) * np.float32(bins)
     place = np.minimum(y.astype(np.int32), bins - 1)
     units = [max(1, round(float(d) * OPTICAL_UNIT)) if d > 0.0 else 0 for d in optical]
     counts = [min(sum(u for u, b in zip(units, place, strict=True) if b == bin_), BIN_LIMIT) for bin_ in range(bins)]

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from schemas.tail import BIN_LIMIT, OPTICAL_UNIT, ROOT_SHARE, SHARE_LEVELS
+from schemas.tail import BIN_LIMIT, OPTICAL_UNIT, PLAIN_SHARE, ROOT_SHARE, SHARE_LEVELS
 
 MOST_BINS: Final = 16
 OPTICAL: Final = -np.log(np.maximum(1.0 - np.arange(256) / 255.0, 1e-3))
@@ -23,7 +23,7 @@ OPTICAL: Final = -np.log(np.maximum(1.0 - np.arange(256) / 255.0, 1e-3))
 UNITS: Final = np.maximum(np.round(OPTICAL * OPTICAL_UNIT), np.arange(256) > 0)
 """The same in the units that depth bins count in; whole numbers, 1 at least where there is any."""
 _ROOT: Final = np.float32(ROOT_SHARE)
-_PLAIN: Final = np.float32(1.0 - ROOT_SHARE)
+_PLAIN: Final = np.float32(PLAIN_SHARE)
 _ZERO: Final = np.float32(0.0)
 
 

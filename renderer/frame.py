@@ -18,7 +18,7 @@ from renderer.programs import Defines
 from schemas.colour import encode_gamma2
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
-from schemas.tail import BIN_LIMIT, OPTICAL_UNIT, ROOT_SHARE, SHARE_LEVELS
+from schemas.tail import BIN_LIMIT, OPTICAL_UNIT, PLAIN_SHARE, ROOT_SHARE, SHARE_LEVELS
 from schemas.view import View
 
 RGB = tuple[float, float, float]
@@ -29,7 +29,7 @@ Gather = Literal["gather-tail", "gather-nearest", "gather"]
 NEAREST = 5
 """The texel of `renderer.features.SUMS` that is the nearest fragment; those before it are sums by blending."""
 BIN_DEFINES: Defines = {
-    **{"ROOT_SHARE": ROOT_SHARE, "SHARE_LEVELS": SHARE_LEVELS},
+    **{"ROOT_SHARE": ROOT_SHARE, "PLAIN_SHARE": PLAIN_SHARE, "SHARE_LEVELS": SHARE_LEVELS},
     **{"OPTICAL_UNIT": OPTICAL_UNIT, "BIN_LIMIT": BIN_LIMIT},
 }
 """What `shaders/common/depth_bins.glsl` and its users need beside BINS."""

@@ -32,7 +32,10 @@ SHARE_LEVELS = 15
 """Steps in which the share of the optical depth in front of a bin is kept: 4 bits."""
 
 ROOT_SHARE = 0.6
-"""Depth bins are equal in `y = (1 - ROOT_SHARE) x + ROOT_SHARE sqrt(x)`: finer in front, where more is visible."""
+PLAIN_SHARE = 0.4
+"""Depth bins are equal in `y = PLAIN_SHARE x + ROOT_SHARE sqrt(x)`: finer in front, where more is visible.
+
+Two numbers, each the float32 nearest to it: languages differ in what `1 - ROOT_SHARE` is."""
 
 MAX_EXPONENT = 60.0
 """The exponent `g D x` is clamped here, so that weights of very dense pixels stay normal float32 numbers."""

@@ -12,8 +12,10 @@ import pytest
 from support.training import export_random, random_weights
 
 from labeller.curves import composite
+from renderer.depth_bins import place_of
 from renderer.features import FEATURES, SUMS, derive, gather, texels_of
-from renderer.frame import Frame, front_bytes
+from renderer.frame import BIN_DEFINES, Frame, front_bytes
+from renderer.programs import expand
 from renderer.techniques import KBufferDeep, technique
 from renderer.techniques.base import Budget
 from schemas.colour import display8
@@ -75,6 +77,32 @@ def test_a_bundle_can_be_rendered_with_another_tail_than_its_own(
         rendered = KBufferDeep(tmp_path).render(frame, Budget(dump.total // 3, other))
         simulated = composite(dump, rendered.k, other).reshape(*rendered.linear.shape)
         assert np.abs(display8(rendered.linear).astype(int) - display8(simulated).astype(int)).max() <= 1
+
+
+@pytest.mark.parametrize("bins", DENSITY_BINS.values())
+def test_places_are_the_same_to_the_bit(ctx: moderngl.Context, tmp_path: Path, bins: int) -> None:
+    """A place that is one unit in the last place off is, once in a million pixels, in another bin."""
+    rng = np.random.default_rng(3)
+    count = 64 * 4000
+    nearest = rng.uniform(0.1, 50.0, count).astype(np.float32)
+    extent = (nearest + rng.choice([1e-5, 1e-2, 0.1, 1.0, 30.0], count).astype(np.float32)) - nearest
+    z = np.minimum(nearest + extent * rng.uniform(0.0, 1.0, count).astype(np.float32), nearest + extent)
+    text = """
+    layout(local_size_x = 64) in;
+    layout(std430, binding = 0) readonly buffer In { float given[]; };
+    layout(std430, binding = 1) writeonly buffer Out { float place[]; };
+    void main() {
+        uint i = gl_GlobalInvocationID.x;
+        place[i] = bin_place(given[3u * i], given[3u * i + 1u], given[3u * i + 2u]);
+    }"""
+    program = ctx.compute_shader(expand("common/depth_bins.glsl", {"BINS": bins, **BIN_DEFINES}) + text)
+    given, out = ctx.buffer(np.stack([z, nearest, extent], axis=1)), ctx.buffer(reserve=4 * count)
+    given.bind_to_storage_buffer(0)
+    out.bind_to_storage_buffer(1)
+    program.run(count // 64)
+    found = np.frombuffer(out.read(), np.float32)
+    expected = np.array([place_of(*each, bins) for each in zip(z, nearest, extent, strict=True)], np.float32)
+    assert np.array_equal(found, expected)
 
 
 @pytest.mark.parametrize("bins", DENSITY_BINS.values())

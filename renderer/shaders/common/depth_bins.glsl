@@ -6,7 +6,7 @@ const uint WORDS = 1u + uint(BINS) / 8u;
 // Bin and position in it, in [0, BINS]. Precise, so that every pass finds the same bin.
 float bin_place(float z, float nearest, float extent) {
     precise float x = extent > 0.0 ? (z - nearest) / extent : 0.0;
-    precise float plain = float(1.0 - ROOT_SHARE) * x;
+    precise float plain = float(PLAIN_SHARE) * x;
     precise float root = float(ROOT_SHARE) * sqrt(x);
     precise float place = (plain + root) * float(BINS);
     return place;
