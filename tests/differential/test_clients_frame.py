@@ -19,7 +19,13 @@ from schemas.fragments import FragmentDump
 from trainer.bundle import Description, write_bundle
 
 B = 16
-CONSTANTS: Defines = {"ROOT_SHARE": 0.6, "SHARE_LEVELS": 15, "OPTICAL_UNIT": 951, "BIN_LIMIT": 65535}
+CONSTANTS: Defines = {
+    "ROOT_SHARE": 0.6,
+    "PLAIN_SHARE": 0.4,
+    "SHARE_LEVELS": 15,
+    "OPTICAL_UNIT": 951,
+    "BIN_LIMIT": 65535,
+}
 LATTICE: Defines = {"BLOCK": 2048, "EDGES": 64, "LAST": 1884160, "SHIFT": 9, "TURNS": 60000}
 CURVES: Defines = {**LATTICE, "MOST_GAIN": 1.2676506002282294e30, "LEAST_RATE": 3.1554436208840472e-30}
 ONES = 0xFFFFFFFF

@@ -25,7 +25,7 @@ CONSTANTS: dict[str, float] = {**CURVE_DEFINES, **BIN_DEFINES, "MAX_EXPONENT": M
 """What the document says in numbers."""
 LATTICE = ("BLOCK", "EDGES", "LAST", "SHIFT", "TURNS")
 CURVES = (*LATTICE, "MOST_GAIN", "LEAST_RATE", "MOST_RATE")
-BINS = ("ROOT_SHARE", "SHARE_LEVELS", "OPTICAL_UNIT", "BIN_LIMIT")
+BINS = ("ROOT_SHARE", "PLAIN_SHARE", "SHARE_LEVELS", "OPTICAL_UNIT", "BIN_LIMIT")
 ALLOCATION = ("totals", "begin", "list", "count", "choose", "blocks", "scan", "offsets")
 
 SURFACE: Defines = {"TEXTURED": 0, "MIXED": 1, "WRAPPED": 0, "MORE_UVS": 0, "EMISSIVE": 0}
