@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import timing
-from renderer.gpu_scene import OPAQUE, TRANSPARENT, GpuScene, set_uniforms
+from renderer.gpu_scene import OPAQUE, TRANSPARENT, GpuScene, run_for, set_uniforms
 from renderer.programs import Defines
 from schemas.colour import encode_gamma2
 from schemas.limits import LIMITS
@@ -376,6 +376,5 @@ class Frame:
         for unit, texture in enumerate(binned):
             texture.use(unit)
         set_uniforms(program, {"width": self.width, "pixels": self.pixels})
-        groups = -(-self.pixels // 64)
-        program.run(min(groups, 1024), -(-groups // 1024))
+        run_for(program, self.pixels)
         return packed

@@ -23,6 +23,8 @@ _NAMES = ("in_position", "in_normal", "in_uv", "in_colour")
 # Texture units: 0..7 belong to the passes, these to the surface.
 _UNITS = {"colour": 8, "opacity": 9, "emission": 10}
 
+_ACROSS = 1024
+"""Groups in the first of two dimensions."""
 _RGBA8, _SRGB8_ALPHA8 = 0x8058, 0x8C43
 """OpenGL's internal formats."""
 
@@ -162,6 +164,12 @@ def set_uniforms(program: moderngl.Program | moderngl.ComputeShader, uniforms: d
     for name, value in uniforms.items():
         if name in program:
             program[name] = value
+
+
+def run_for(program: moderngl.ComputeShader, pixels: int) -> None:
+    """Run a shader of 64 threads a group for every pixel: groups are in two dimensions, which hold any picture."""
+    groups = -(-pixels // 64)
+    program.run(min(groups, _ACROSS), -(-groups // _ACROSS))
 
 
 def _upload(ctx: moderngl.Context, texture: Texture) -> moderngl.Texture:

@@ -20,7 +20,7 @@ import moderngl
 import numpy as np
 
 from renderer.allocation.lattice import EDGES, LAST, LEAST_RATE, MOST_FRAGMENTS, MOST_GAIN, MOST_RATE, ROUNDS, SHIFT
-from renderer.gpu_scene import set_uniforms
+from renderer.gpu_scene import run_for, set_uniforms
 from renderer.programs import Programs
 
 BLOCK = 2048
@@ -42,15 +42,14 @@ STATE = np.dtype(
     ]
 )
 """`allocation/state.glsl`."""
-_COUNT_GROUPS = 44
+assert STATE.fields is not None, "it is a structure"
+_COUNT_GROUPS = int(STATE.fields["count_groups"][1])
 """Byte of `count_groups` in it."""
 
 DEFINES = {"BLOCK": BLOCK, "EDGES": EDGES, "LAST": LAST, "SHIFT": SHIFT, "TURNS": MOST_FRAGMENTS}
 CURVE_DEFINES = {**DEFINES, "MOST_GAIN": MOST_GAIN, "LEAST_RATE": LEAST_RATE, "MOST_RATE": MOST_RATE}
 """Of a shader that writes curves."""
 
-_ACROSS = 1024
-"""Groups in the first of two dimensions."""
 _STATE, _COUNTS, _LIST, _CURVES, _BLOCKS = range(5)
 """Storage bindings of `allocation/*.comp`."""
 
@@ -129,10 +128,9 @@ class FrameAllocation:
         self._run("begin", 1, blocks=self._groups, budget=min(budget, CEILING - 1))
 
     def run_pixels(self, program: moderngl.ComputeShader, state_binding: int) -> None:
-        """Run a shader of 64 threads a group on every pixel, with the state bound; its groups are in two dimensions."""
+        """Run a shader on every pixel, as `run_for` does, with the state bound."""
         self._buffers[_STATE].bind_to_storage_buffer(state_binding)
-        groups = -(-self._pixels // 64)
-        program.run(min(groups, _ACROSS), -(-groups // _ACROSS))
+        run_for(program, self._pixels)
         self._ctx.memory_barrier()
 
     def solve(self, curves: moderngl.Buffer) -> None:

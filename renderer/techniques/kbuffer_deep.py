@@ -78,7 +78,8 @@ class _Prediction:
 def before_bytes(gathered: Gathered) -> int:
     """Bytes a pixel at most until fragments are captured: gathering, running the network, or choosing slots."""
     kept = front_bytes(gathered.bins) or FIRST_SUM_BYTES
-    return RANGE_BYTES + CURVE_BYTES + max(gathered.pass_bytes - CURVE_BYTES, gathered.pixel_bytes, kept + LIST_BYTES)
+    predicting, choosing = gathered.pixel_bytes + CURVE_BYTES, kept + CURVE_BYTES + LIST_BYTES
+    return RANGE_BYTES + max(gathered.pass_bytes, predicting, choosing)
 
 
 class KBufferDeep:

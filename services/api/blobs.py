@@ -55,7 +55,7 @@ def find_missing(body: Annotated[Hashes, Depends(JsonBody(Hashes))], service: Se
 async def head_blob(sha256: BlobHash, request: Request, service: Services) -> Response:
     """Size and ETag of a file."""
     size = await _size(service, sha256)
-    if is_current(request.headers.get("if-none-match"), sha256):
+    if is_current(request, sha256):
         return Response(status_code=304, headers=_headers(sha256))
     return Response(headers={**_headers(sha256), "Content-Length": str(size)}, media_type=FileRange.media_type)
 
@@ -65,7 +65,7 @@ async def read_blob(sha256: BlobHash, request: Request, service: Services) -> Re
     """A file, or one range of it."""
     size = await _size(service, sha256)
     headers = _headers(sha256)
-    if is_current(request.headers.get("if-none-match"), sha256):
+    if is_current(request, sha256):
         return Response(status_code=304, headers=headers)
     wanted = _range(request, sha256, size)
     path = await to_thread.run_sync(service.storage.blobs.path, sha256)

@@ -64,7 +64,7 @@ def read_version(name: NamePath, version: VersionPath, request: Request, service
     content = service.registry.record(service.registry.resolve(f"{name}@{version}")).model_dump_json().encode()
     tag = hashlib.sha256(content).hexdigest()
     headers = {"ETag": f'"{tag}"'}
-    if is_current(request.headers.get("if-none-match"), tag):
+    if is_current(request, tag):
         return Response(status_code=304, headers=headers)
     return Response(content, media_type="application/json", headers=headers)
 

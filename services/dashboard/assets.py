@@ -57,6 +57,6 @@ def read_asset(
         raise Refusal("not-found")
     made, tag = content(name)
     headers = {"ETag": f'"{tag}"', "Cache-Control": "public, max-age=31536000, immutable"}
-    if is_current(request.headers.get("if-none-match"), tag):
+    if is_current(request, tag):
         return Response(status_code=304, headers=headers)
     return Response(made, media_type=_SOURCES[name][0], headers=headers)

@@ -60,7 +60,6 @@ def list_models(request: Request, service: Services, paging: Page) -> Response:
         models=models,
         champions={champion.name: champion for champion in best},
         paging=paging,
-        first="cursor" not in request.query_params,
     )
 
 
@@ -96,7 +95,6 @@ def show_model(
         count=len(published),
         numbers=[publication.version for publication in published[::-1]][:200],
         paging=paging,
-        first="cursor" not in request.query_params,
         aliases=aliases,
         aliases_offered=sorted({CHAMPION, CANDIDATE, *aliases}),
         moves=registry.moves(name)[::-1][:_MOVES],

@@ -58,7 +58,14 @@ def render(request: Request, template: str, status: int = 200, **values: Any) ->
     text = (
         _environment()
         .get_template(f"dashboard/{template}.html.j2")
-        .render(who=who, may=may, csrf=getattr(request.state, "csrf", ""), path=request.scope["path"], **values)
+        .render(
+            who=who,
+            may=may,
+            csrf=getattr(request.state, "csrf", ""),
+            path=request.scope["path"],
+            first="cursor" not in request.query_params,  # of the pages of a list
+            **values,
+        )
     )
     return Response(text, status, HEADERS, media_type="text/html")
 

@@ -39,7 +39,6 @@ def list_scenes(request: Request, service: Services, paging: Page, state: SceneS
         "scenes",
         scenes=scenes,
         paging=paging,
-        first="cursor" not in request.query_params,
         chosen=state,
         states=get_args(SceneState),
     )
@@ -93,7 +92,7 @@ def read_picture(
             raise Refusal("not-found", "This scene has no such picture.")
     # What has an address never changes, but it may be removed.
     headers = {"ETag": f'"{key[:16]}-{kind}-{top}-{file}"', "Cache-Control": "private, max-age=86400"}
-    if is_current(request.headers.get("if-none-match"), headers["ETag"].strip('"')):
+    if is_current(request, headers["ETag"].strip('"')):
         return Response(status_code=304, headers=headers)
     try:
         content = service.storage.store.read(artifact, file)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.fragments import FragmentDump
-from schemas.tail import ROOT_SHARE
+from schemas.tail import PLAIN_SHARE, ROOT_SHARE
 
 LONGEST: Final = 4096
 """Fragments of the longest list."""
@@ -134,8 +134,8 @@ def curve_cases(quick: bool, seed: int) -> list[Case]:
 def bin_cases() -> list[Case]:
     """What is hard for the depth bins of the binned density tails, 8 and 16: their edges, ties of shares, full bins."""
     edge = np.arange(17) / 16.0
-    # x of `y = (1 - r) x + r sqrt(x)`, by the quadratic formula in sqrt(x).
-    x = ((np.sqrt(ROOT_SHARE**2 + 4.0 * (1.0 - ROOT_SHARE) * edge) - ROOT_SHARE) / (2.0 * (1.0 - ROOT_SHARE))) ** 2
+    # x of `y = p x + r sqrt(x)`, by the quadratic formula in sqrt(x).
+    x = ((np.sqrt(ROOT_SHARE**2 + 4.0 * PLAIN_SHARE * edge) - ROOT_SHARE) / (2.0 * PLAIN_SHARE)) ** 2
     edges = np.add.outer(np.arange(-2, 3) * 2.0**-23, 1.0 + x).clip(1.0, 2.0).ravel()
     # One of 30 equal fragments in front: a share of 1/30, as near to 0 as to 1/15; so with all odd numbers of them.
     ties = [np.where(np.arange(30) < ahead, 1.0, 2.0) for ahead in range(1, 30, 2)]
