@@ -30,13 +30,25 @@ make_venv() {
     "$python" -m venv --clear .venv
 }
 
+# PyTorch brings its CUDA libraries: 6.5 GB on Linux x86-64, and the files that they come in while they are unpacked.
+# A disk that fills up half-way says so after minutes, and not what to do.
+NEEDED_GB=11
+
+check_space() {
+    local free
+    free=$(df --output=avail -BG . | tail -n 1 | tr -dc 0-9)
+    [ "$free" -ge "$NEEDED_GB" ] ||
+        die "about $NEEDED_GB GB are needed to install, and $free GB are free here: make room, then run this again."
+}
+
 install_packages() {
-    say "installing the locked dependencies (about 6 GB on disk on Linux x86-64: PyTorch brings its CUDA libraries)"
+    check_space
+    say "installing the locked dependencies (about 6.5 GB on disk on Linux x86-64)"
     if command -v uv >/dev/null; then
         uv pip install --quiet --python .venv/bin/python --require-hashes -r requirements.lock
         uv pip install --quiet --python .venv/bin/python --no-deps --no-build-isolation -e .
     else
-        .venv/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+        .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-cache-dir --require-hashes -r requirements.lock
         .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
     fi
 }
