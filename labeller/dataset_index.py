@@ -17,12 +17,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    model_serializer,
+)
 
 from labeller.columns import Column, CountType, columns
 from labeller.sampling import Sampling
 from labeller.shard_file import open_columns, write_atomically
 from labeller.shards import ShardMeta, explained
+from schemas.pixel_weights import DEFAULT_WEIGHTS, PixelWeights, without_default
 from schemas.problem import ExitCode, Problem
 from schemas.tail import MetricName, TailName
 from schemas.view import View
@@ -91,6 +99,7 @@ class Labels(BaseModel):
         g: Steepness of the density tail.
         metric: Space of the error.
         k_min: First k of the hulls.
+        weights: What the errors of a pixel count.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -99,11 +108,17 @@ class Labels(BaseModel):
     g: float
     metric: MetricName
     k_min: int
+    weights: PixelWeights = DEFAULT_WEIGHTS
+
+    @model_serializer(mode="wrap")
+    def _written(self, usual: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without weights an index has the text from before there were any."""
+        return without_default(usual(self))
 
     @classmethod
     def of(cls, meta: ShardMeta) -> Labels:
         """Those of a shard."""
-        return cls(tail=meta.tail, g=meta.g, metric=meta.metric, k_min=meta.k_min)
+        return cls(tail=meta.tail, g=meta.g, metric=meta.metric, k_min=meta.k_min, weights=meta.weights)
 
 
 class DatasetIndex(BaseModel):

@@ -12,11 +12,18 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    model_serializer,
+)
 
 from labeller.curves import Curves
 from labeller.hull import Hulls
@@ -26,6 +33,7 @@ from labeller.shard_file import Columns, Damage, OtherSchema, ShardFile, Written
 from labeller.skips import needed_budgets
 from renderer.features import derive, gather
 from schemas.fragments import FragmentDump
+from schemas.pixel_weights import DEFAULT_WEIGHTS, PixelWeights, without_default
 from schemas.problem import ExitCode, Problem
 from schemas.tail import DENSITY_BINS, MetricName, TailName
 
@@ -74,6 +82,7 @@ class ShardMeta(BaseModel):
         g: Steepness of the density tail.
         metric: Space of the error.
         k_min: First k of the hulls.
+        weights: What the errors of a pixel count, in its hull and in the levels.
         sampling: How the rows were drawn.
         levels: Optimal allocations, by rising budget.
     """
@@ -89,8 +98,14 @@ class ShardMeta(BaseModel):
     g: float
     metric: MetricName
     k_min: int = Field(ge=0, le=1)
+    weights: PixelWeights = DEFAULT_WEIGHTS
     sampling: Sampling
     levels: tuple[Level, ...]
+
+    @model_serializer(mode="wrap")
+    def _written(self, usual: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without weights a shard's bytes are those from before there were any."""
+        return without_default(usual(self))
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,18 +166,20 @@ def write_shard(
     fraction: float = 0.2,
     seed: int = 0,
     kind: SamplingKind = "stratified",
+    weights: PixelWeights = DEFAULT_WEIGHTS,
 ) -> Written:
     """Sample a view and write its shard, atomically. Any number of processes may write shards of one data set.
 
     Args:
         path: File to write; its folder exists.
         dump: Fragments of the view.
-        curves: Its error curves.
+        curves: Its error curves, weighted already.
         hulls: The curves' hulls.
         budgets: Fragment counts F that results are measured at; those of N and above are left out.
         fraction: Share of the pixels with more than k_min fragments that become rows.
         seed: Seed of the sample.
         kind: `stratified`: the same share of every n; `uniform`: the same probability for every pixel, as in DHOIT.
+        weights: What the errors in `curves` were weighted with.
 
     Returns:
         Sums and size, for the index of a data set.
@@ -180,6 +197,7 @@ def write_shard(
         g=curves.g,
         metric=curves.metric,
         k_min=hulls.k_min,
+        weights=weights,
         sampling=sampling,
         levels=_levels(dump, curves, hulls, budgets),
     )

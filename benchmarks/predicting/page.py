@@ -15,15 +15,18 @@ Found = Mapping[str, Any]
 SMALL, TINY = 1.1, 1.3
 """Score that a `small` and a `tiny` bundle may have, relative to the best."""
 
-_ADDS_PLOT: Final = "predictors-multiply-adds.svg"
-_BYTES_PLOT: Final = "predictors-bytes.svg"
+_PLOTS: Final = {
+    "multiply-adds": ("multiply-adds a pixel", "multiply_adds"),
+    "bytes": ("bytes a pixel that the gather pass writes", "feature_bytes"),
+}
+"""What scores are drawn against: end of the file's name -> title and cost."""
 
 _HEAD = """\
 # Predictors, measured
 
 ```
-python -m benchmarks.predictors --scenes ../shared/scenes --work FOLDER \\
-    --out benchmarks/results/predictors.json --page benchmarks/PREDICTORS.md
+python -m benchmarks.predictors --scenes ../shared/scenes --work FOLDER{options} \\
+    --out benchmarks/results/{name}.json --page benchmarks/{page}.md
 ```
 
 **Score.** `q = (MSE + 1e-7) / (MSE of the oracle + 1e-7)` of a view at F = W H x 1, 2, 4 where F < N, k_min 1. The
@@ -53,18 +56,29 @@ _TITLES: Final = {
     "presets": "Presets",
     "augmentation": "More to train on",
     "inputs": "Neighbourhoods, views, resolution and feedback",
+    "tails": "Tails with something learned",
 }
 
 _NOTES: Final = {
     "labels": "Rows with the labels of `density` have no depth bins either: compare with the network that reads none.",
     "losses": (
         "`distilled`: a `small` network learns the gains that the `full` one of the same fold answers where that stops "
-        "at the drawn prices, alone or half and half with the regret."
+        "at the drawn prices, alone or half and half with the regret. `weights of FLIP`: pixels weigh in the regret "
+        "what FLIP makes of a squared error of theirs (`labeller.flip_weights`); q is of errors without weights."
     ),
     "augmentation": (
         "Beside the views themselves: views of opacity .33 with three other opacities; every view with R, G and B of "
         "each pixel in another order (labels stay as they are); views of opacity .33 from which one half of the coarse "
         "colours is gone, or the other half."
+    ),
+    "tails": (
+        "`density, g from network`, `density-16, factor from network`: a third output says what the exponents of a "
+        "pixel's tail are multiplied with, learned by the regret at the count that the network's own curve gives; its "
+        "optimum has the best count and the best factor of each pixel. `learned exponents`: 12 hidden units correct "
+        "the exponent of every fragment of the tail by what the bins around it hold (their multiply-adds are for each "
+        "such fragment); `learned coverage`: the transmittance of a pixel's tail when it is resolved. Both are fitted "
+        "to the errors of pictures with the counts of the network without them, and scored with the same counts. "
+        "Moments are in the table of tails: four power moments take more bytes than 8 bins, and their optimum is worse."
     ),
     "presets": "DHOIT's network as printed (`paper`: Eq. 3, floor only) and with its labels' scale and fill repaired.",
     "inputs": (
@@ -78,12 +92,17 @@ _NOTES: Final = {
 }
 
 
-def page(found: Found) -> str:
-    """Markdown of what was measured."""
-    parts = [_HEAD, _circumstances(found)]
+def page(found: Found, name: str) -> str:
+    """Markdown of what was measured.
+
+    Args:
+        found: The figures.
+        name: Of their file, without its suffix.
+    """
+    parts = [_HEAD.format(options=_options(found["setting"]), name=name, page=name.upper()), _circumstances(found)]
     variants: Mapping[str, Found] = found["variants"]
     if variants:
-        parts += [_sizes(variants), _parts(variants)]
+        parts += [_sizes(variants, name), _parts(variants)]
     if "rules" in found:
         parts.append(_rules(found["rules"]))
     if "tails" in found:
@@ -93,22 +112,26 @@ def page(found: Found) -> str:
     return "\n".join(parts)
 
 
-def plots(found: Found) -> dict[str, str]:
-    """SVG files by name."""
+def plots(found: Found, name: str) -> dict[str, str]:
+    """SVG files by name.
+
+    Args:
+        found: The figures.
+        name: Of their file, without its suffix.
+    """
     variants = {name: row for name, row in found["variants"].items() if row["is_product"]}
     if not variants:
         return {}
     made = {}
-    for file, title, cost in (
-        (_ADDS_PLOT, "multiply-adds a pixel", "multiply_adds"),
-        (_BYTES_PLOT, "bytes a pixel that the gather pass writes", "feature_bytes"),
-    ):
-        points = {name: (float(row["cost"][cost]), score(row["q"])) for name, row in variants.items()}
-        series: dict[str, Points] = {"front": [points[name] for name in front(points)]}
+    for file, (title, cost) in _PLOTS.items():
+        points = {variant: (float(row["cost"][cost]), score(row["q"])) for variant, row in variants.items()}
+        series: dict[str, Points] = {"front": [points[variant] for variant in front(points)]}
         for tail in sorted({row["tail"] for row in variants.values()}):
-            series[tail] = [points[name] for name, row in variants.items() if row["tail"] == tail]
+            series[tail] = [points[variant] for variant, row in variants.items() if row["tail"] == tail]
         labels = Labels(f"Score against {title}", title, "score (1: DHOIT's oracle)")
-        made[file] = log_log(labels, series, proportional=False, apart=[name for name in series if name != "front"])
+        made[f"{name}-{file}.svg"] = log_log(
+            labels, series, proportional=False, apart=[tail for tail in series if tail != "front"]
+        )
     return made
 
 
@@ -132,7 +155,7 @@ def _price(row: Found) -> int:
     return int(row["cost"]["multiply_adds"] * row["cost"]["gather_bytes"])
 
 
-def _sizes(variants: Mapping[str, Found]) -> str:
+def _sizes(variants: Mapping[str, Found], file: str) -> str:
     shipped = {name: row for name, row in variants.items() if row["is_product"]}
     if not shipped:
         return ""
@@ -141,13 +164,13 @@ def _sizes(variants: Mapping[str, Found]) -> str:
         for name, row in shipped.items()
     }
     proposed = proposals(shipped)
-    lines = [f"- `{size}`: {name}" for size, name in proposed.items()]
+    lines = "\n".join(f"- `{size}`: {name}" for size, name in proposed.items())
+    drawn = "\n\n".join(f"![Score against {cost}](results/{file}-{cost}.svg)" for cost in _PLOTS)
     chosen = sorted(front(points), key=lambda name: points[name])
     return (
         "## Sizes\n\nProposed: `full` has the best score; `small` and `tiny` have the least product of multiply-adds "
         f"and bytes while gathering, of those within {100 * (SMALL - 1):.0f} % and {100 * (TINY - 1):.0f} % of its "
-        "score.\n\n" + "\n".join(lines) + "\n\n"
-        f"![Score against multiply-adds](results/{_ADDS_PLOT})\n\n![Score against bytes](results/{_BYTES_PLOT})\n\n"
+        f"score.\n\n{lines}\n\n{drawn}\n\n"
         "No other variant of the product is at least as good as one of these in multiply-adds, bytes while gathering "
         f"and score:\n\n{_table(_COLUMNS, (_row(name, shipped[name]) for name in chosen))}"
     )
@@ -167,10 +190,20 @@ def _parts(variants: Mapping[str, Found]) -> str:
             ((*_row(name, row), *_change(row, variants, spread)) for name, row in listed.items()),
         )
         note = f"{_NOTES[part]}\n\n" if part in _NOTES else ""
-        sections.append(f"## {title}\n\n{note}{table}")
+        sections.append(f"## {title}\n\n{note}{table}{_flip(rows)}")
     if spread is not None:
         sections.append(f"Seeds alone move the score by {100 * spread:.1f} %; a change below that is marked ~.\n")
     return "\n".join(sections)
+
+
+def _flip(rows: Mapping[str, Found]) -> str:
+    """FLIP of the rows that know it, relative to that of what they are compared with."""
+    known = {name: row for name, row in rows.items() if "flip / base" in row}
+    if not known:
+        return ""
+    heads = ("mean FLIP over that of", "", "x1", "x2", "x4")
+    cells = ((row["base"], name, *_numbers(row["flip / base"])) for name, row in known.items())
+    return f"\n{_table(heads, cells)}"
 
 
 def _spread(variants: Mapping[str, Found]) -> float | None:
@@ -258,6 +291,12 @@ def _assets(variants: Mapping[str, Found], names: Sequence[str]) -> str:
     )
     heads = [f"{name} x{multiple}" for name in names for multiple in (1, 2, 4)]
     return f"## Every asset, held out\n\nWorst first, by `{names[0]}`.\n\n{_table(('asset', *heads), rows)}"
+
+
+def _options(setting: Found) -> str:
+    """How a smaller run was asked for."""
+    width, height = setting["size"]
+    return f" --size {width}x{height} --views {setting['most']} --folds {setting['folds']}"
 
 
 def _circumstances(found: Found) -> str:

@@ -76,13 +76,26 @@ def _score_view(store: Store, row: ViewRow, variant: Variant, weights: Weights, 
     curves = labels.curves(dump)
     allocate = allocation_of(variant, weights, dump, curves)
 
-    def mse(budget: int | None) -> float | None:
-        return None if budget is None else curves.total(allocate(budget)) / (3 * row.pixels)
+    def mse(budget: int) -> float:
+        return curves.total(allocate(budget)) / (3 * row.pixels)
 
+    return scored_row(row, oracle_of(store, row), labels.mse["optimal"], cost, mse)
+
+
+def scored_row(row: ViewRow, oracle: list[float], optimum: list[float], cost: Cost, mse: Callable[[int], float]) -> Row:
+    """The figures of a view.
+
+    Args:
+        row: The view.
+        oracle: Mean squared errors of the oracle at the view's budgets.
+        optimum: Those of the tail's optimum.
+        cost: What the variant costs a pixel.
+        mse: Mean squared error of what it makes of a budget.
+    """
     # A view's oracle pays for nothing: it has F whatever the others' memory.
-    oracle = oracle_of(store, row)
-    within = [mse(cost.budget(memory_of(m, row.pixels), row.pixels)) for m in row.multiples]
-    errors = [curves.total(allocate(budget)) / (3 * row.pixels) for budget in row.budgets]
+    budgets = [cost.budget(memory_of(m, row.pixels), row.pixels) for m in row.multiples]
+    within = [None if budget is None else mse(budget) for budget in budgets]
+    errors = [mse(budget) for budget in row.budgets]
     return {
         "asset": row.asset,
         "mode": row.mode,
@@ -90,7 +103,7 @@ def _score_view(store: Store, row: ViewRow, variant: Variant, weights: Weights, 
         "multiples": row.multiples,
         "mse": errors,
         "q": [ratio(e, o) for e, o in zip(errors, oracle, strict=True)],
-        "of optimum": [ratio(e, o) for e, o in zip(errors, labels.mse["optimal"], strict=True)],
+        "of optimum": [ratio(e, o) for e, o in zip(errors, optimum, strict=True)],
         "at memory": [None if e is None else ratio(e, o) for e, o in zip(within, oracle, strict=True)],
     }
 

@@ -46,6 +46,9 @@ CODE: Final = {
         *_here("scoring", "feedback", "inputs", "cost"),
     ),
     "tails": (*_LABELLER, "schemas.tail", *_here("tails", "tail_kernels")),
+    "learned": ("renderer.depth_bins", *_here("learned_tail", "learned_scores", "tail_kernels")),
+    "weighted": ("labeller.flip_weights", "renderer.metrics", "schemas.colour", *_here("weighted")),
+    "factors": ("schemas.tail", *_here("factors", "factor_scores", "tail_kernels")),
 }
 """Sources that decide a kind of result: one of them changed, it is worked out again."""
 

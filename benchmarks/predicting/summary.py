@@ -9,13 +9,16 @@ from typing import Any, Final
 import numpy as np
 
 from benchmarks.predicting.cost import Cost, network_cost, rule_cost
+from benchmarks.predicting.factor_scores import factor_cost, factor_network, factor_scores
 from benchmarks.predicting.inputs import BLOCKS
 from benchmarks.predicting.labels import OFFLINE, RUN_TIME, at_memory, labels_of, oracle_of
+from benchmarks.predicting.learned_scores import corrections_of, learned_cost, learned_scores
 from benchmarks.predicting.scoring import Row, ratio, scores_of
 from benchmarks.predicting.store import Store
 from benchmarks.predicting.training import Trainings
-from benchmarks.predicting.variants import Variant
+from benchmarks.predicting.variants import Variant, variants
 from benchmarks.predicting.views import MULTIPLES, ViewRow
+from benchmarks.predicting.weighted import weighted_network, weighted_scores
 from schemas.tail import TailName
 
 TAILS: Final[tuple[TailName, ...]] = ("density-16", "density-8", "density", "weighted-average")
@@ -53,15 +56,14 @@ def score(q: Sequence[float | None]) -> float:
 
 def variant_summary(trainings: Trainings, variant: Variant) -> dict[str, Any]:
     """Scores and cost of a variant; it is trained and scored where that has not been done."""
-    rows = scores_of(trainings, variant)
-    weights = trainings.network(variant, trainings.folds[0])
-    cost = network_cost(weights, variant.tail, BLOCKS.get(variant.inputs, 1))
+    rows, cost = _measured(trainings, variant)
     assets = sorted({row["asset"] for row in rows})
     return {
         "part": variant.part,
         "tail": variant.tail,
         "base": variant.base,
         "is_product": not (variant.augmentation or variant.teacher or variant.feedback or variant.labels)
+        and (variant.learned, variant.weights) == (None, "none")
         and (variant.inputs, variant.config.preset) == ("plain", "gain-curve"),
         "cost": asdict(cost),
         "q": by_multiple(rows, "q"),
@@ -69,7 +71,22 @@ def variant_summary(trainings: Trainings, variant: Variant) -> dict[str, Any]:
         "at memory": by_multiple(rows, "at memory"),
         "worst": _worst(rows),
         "assets": {asset: by_multiple([row for row in rows if row["asset"] == asset], "q") for asset in assets},
+        **({"flip / base": by_multiple(rows, "flip / base")} if "flip / base" in rows[0] else {}),
     }
+
+
+def _measured(trainings: Trainings, variant: Variant) -> tuple[list[Row], Cost]:
+    """Scores of the views, and the cost of one fold's network: folds differ in none of it."""
+    first = trainings.folds[0]
+    if variant.learned == "factor":
+        return factor_scores(trainings, variant), factor_cost(factor_network(trainings, variant, first), variant)
+    if variant.learned is not None:
+        base, corrections = variants()[variant.base], corrections_of(trainings, variant, first)
+        return learned_scores(trainings, variant), learned_cost(trainings.network(base, first), variant, corrections)
+    is_plain = variant.weights == "none"
+    weights = trainings.network(variant, first) if is_plain else weighted_network(trainings, variant, first)
+    cost = network_cost(weights, variant.tail, BLOCKS.get(variant.inputs, 1))
+    return (scores_of if is_plain else weighted_scores)(trainings, variant), cost
 
 
 def rules_summary(store: Store, rows: Sequence[ViewRow]) -> list[dict[str, Any]]:

@@ -10,12 +10,26 @@ from benchmarks.predicting.augmentation import Augmentation
 from benchmarks.predicting.inputs import BLOCKS, Inputs
 from renderer.features import FEATURES, FEATURES_GLSL
 from schemas.network import SIZES
+from schemas.pixel_weights import PixelWeights
 from schemas.tail import DEFAULT_TAIL, TailName
 from trainer.config import Preset, TrainConfig
 
 Part = Literal[
-    "variants", "bundles", "sizes", "features", "losses", "seeds", "labels", "presets", "augmentation", "inputs"
+    "variants",
+    "bundles",
+    "sizes",
+    "features",
+    "losses",
+    "seeds",
+    "labels",
+    "presets",
+    "augmentation",
+    "inputs",
+    "tails",
 ]
+Learned = Literal["factor", "exponents", "coverage"]
+"""`factor`: the network also says what the exponents of a pixel's tail are multiplied with; of `density` that is g.
+`exponents`, `coverage`: a second, small network corrects every fragment's exponent, or the tail's transmittance."""
 Feedback = Literal["error", "colour"]
 """What a resolved pixel knows of its last core fragment: by how much the error fell (nobody knows that in a frame), or
 by how much the colour changed."""
@@ -41,6 +55,8 @@ class Variant:
         teaching: Share of the loss that is the teacher's.
         feedback: What corrects its curves after a first frame; None: nothing.
         turns: How often.
+        learned: What is learned of the tail itself; None: nothing.
+        weights: What the errors count that it learns from.
         base: The variant that it is compared with; empty: none.
     """
 
@@ -55,6 +71,8 @@ class Variant:
     teaching: float = 0.0
     feedback: Feedback | None = None
     turns: int = 0
+    learned: Learned | None = None
+    weights: PixelWeights = "none"
     base: str = DEFAULT
 
     @property
@@ -127,6 +145,8 @@ def _variants() -> Iterator[Variant]:
         "teacher": f"full, {DEFAULT}",
         "base": f"small, {DEFAULT}",
     }
+    for tail in (DEFAULT, SPARE):
+        yield Variant(f"weights of FLIP, {tail}", "losses", tail, weights="flip", base=tail)
     for name, teaching in {"distilled": 1.0, "distilled, half regret": 0.5}.items():
         yield Variant(name, "losses", teaching=teaching, **taught)
     for seed in (1, 2):
@@ -151,6 +171,12 @@ def _variants() -> Iterator[Variant]:
     for feedback in kinds:
         for turns in (1, 2):
             yield Variant(f"feedback of {feedback}, {turns}", "inputs", feedback=feedback, turns=turns)
+    yield Variant("density, g from network", "tails", "density", learned="factor", base="density")
+    yield Variant("density-16, factor from network", "tails", learned="factor")
+    corrected: tuple[Learned, ...] = ("exponents", "coverage")
+    for tail in (DEFAULT, SPARE):
+        for learned in corrected:
+            yield Variant(f"{tail}, learned {learned}", "tails", tail, learned=learned, base=tail)
 
 
 def _sizes() -> Iterator[Variant]:

@@ -10,7 +10,7 @@ import moderngl
 import pytest
 
 from benchmarks import predictors
-from benchmarks.predicting import training, variants
+from benchmarks.predicting import learned_scores, summary, training, variants, weighted
 from benchmarks.predicting.variants import Variant
 from trainer.config import TrainConfig
 
@@ -26,6 +26,10 @@ FEW = {
     "colours": Variant("colours", "augmentation", "density-16", SHORT, augmentation="colours"),
     "cuts": Variant("cuts", "augmentation", "density-16", SHORT, augmentation="cuts"),
     "half": Variant("half", "inputs", "density-16", SHORT, inputs="half-resolution"),
+    "weights": Variant("weights", "losses", "density-16", SHORT, weights="flip"),
+    "factor": Variant("factor", "tails", "density", SHORT, learned="factor", base="density-16"),
+    "exponents": Variant("exponents", "tails", "density-16", SHORT, learned="exponents"),
+    "coverage": Variant("coverage", "tails", "density-16", SHORT, learned="coverage"),
     "distilled": Variant("distilled", "losses", "density-16", SHORT, teacher="density-16", teaching=0.5),
 }
 
@@ -37,7 +41,7 @@ def folder(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Pa
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in (predictors, variants, training):
+    for module in (predictors, variants, training, summary, weighted, learned_scores):
         monkeypatch.setattr(module, "variants", lambda: FEW)
 
 
@@ -56,6 +60,8 @@ def test_it_runs_and_does_nothing_twice(folder: Path, monkeypatch: pytest.Monkey
     assert len(every["assets"]) == found["setting"]["assets"] > 4
     assert all(value is None or value >= 1.0 - 1e-6 for value in every["of optimum"])
     assert found["variants"]["feedback"]["q"] != every["q"]
+    assert all(found["variants"][name]["of optimum"][0] >= 1.0 - 1e-6 for name in ("weights", "factor", "exponents"))
+    assert "mean FLIP over that of" in (folder / "P.md").read_text()
     oracle = next(r for r in found["rules"] if (r["tail"], r["rule"]) == ("weighted-average", "greedy"))
     assert all(value is None or value == pytest.approx(1.0) for value in oracle["q"])
     assert len(found["tails"]) > 10

@@ -85,6 +85,18 @@ def test_the_same_view_gives_the_same_bytes_and_another_seed_other_rows(path: Pa
     assert sorted(p.name for p in tmp_path.iterdir()) == ["again", "other"]
 
 
+def test_weights_are_named_where_there_are_any(path: Path, tmp_path: Path) -> None:
+    write_shard(tmp_path / "weighted", DUMP, CURVES, HULLS, BUDGETS, weights="flip")
+    assert (read_shard(path).meta.weights, read_shard(tmp_path / "weighted").meta.weights) == ("none", "flip")
+    # What was written before there were any is what is written without them.
+    headers = []
+    for written in (path, tmp_path / "weighted"):
+        with open_columns(written) as file:
+            headers.append(dict(file.layout.view))
+    assert "weights" not in headers[0]
+    assert headers[1] == {**headers[0], "weights": "flip"}
+
+
 def test_a_view_in_which_nothing_can_be_gained_has_no_rows(tmp_path: Path) -> None:
     dump = random_dump(4, 4, 1, seed=0)
     curves = error_curves(dump)
