@@ -1,4 +1,4 @@
-"""The one OpenGL context of this process, headless through EGL.
+"""The one OpenGL context of this process: headless through EGL, or that of a window.
 
 `python -m renderer.context` checks that it can be made.
 
@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import os
 import sys
-from functools import cache
 from typing import Any
 
 import moderngl
@@ -21,9 +20,14 @@ PACKAGES = "libegl1 libgl1 libgl1-mesa-dri libegl-mesa0"
 """Debian/Ubuntu packages that make a context possible on a machine without a GPU."""
 
 
-@cache
+LEAST_VERSION = 450
+"""OpenGL 4.5, as moderngl writes it."""
+
+_context: moderngl.Context | None = None
+
+
 def gl_context() -> moderngl.Context:
-    """The process's context, made at the first call.
+    """The process's context, made at the first call unless a window's was adopted.
 
     Returns:
         An OpenGL 4.5 core context.
@@ -31,12 +35,44 @@ def gl_context() -> moderngl.Context:
     Raises:
         Problem: There is no driver, or it is older than OpenGL 4.5.
     """
+    global _context
+    if _context is None:
+        _context = _headless()
+    return _context
+
+
+def adopt(context: moderngl.Context) -> None:
+    """Make the context of a window, which is current, that of this process.
+
+    Raises:
+        Problem: It is older than OpenGL 4.5.
+        RuntimeError: The process has another one already.
+    """
+    global _context
+    if _context is not None:
+        raise RuntimeError("this process has an OpenGL context already")
+    if context.version_code < LEAST_VERSION:
+        raise Problem(
+            f"The window has OpenGL {context.version_code / 100:.1f}.",
+            "OpenGL 4.5 is needed: update the driver.",
+            ExitCode.CHECK_FAILED,
+        )
+    context.gc_mode = "auto"
+    _context = context
+
+
+def limit_threads() -> None:
+    """Hold a software driver to our cores; to be called before there is a context."""
     # llvmpipe compiles every shader for the widest vectors it finds; this keeps its own worker count to our cores.
     os.environ.setdefault("LP_NUM_THREADS", str(min(16, len(os.sched_getaffinity(0)))))
+
+
+def _headless() -> moderngl.Context:
+    limit_threads()
     try:
         # moderngl hands further settings on to the backend, though its signature types them otherwise.
         settings: dict[str, Any] = {"backend": "egl"}
-        ctx = moderngl.create_context(standalone=True, require=450, **settings)
+        ctx = moderngl.create_context(standalone=True, require=LEAST_VERSION, **settings)
     except Exception as reason:  # glcontext raises bare Exceptions of several kinds
         raise Problem(
             f"No OpenGL 4.5 context could be made ({reason}).",

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Sees to what only the tests need: PostgreSQL's programs, with which the tests start servers of their own; Mesa's zink
 # over its software Vulkan driver, on which they draw every technique a second time; the reference compiler of GLSL; a
-# C and a C++ compiler for the header of deploy/client/c; a browser for the dashboard.
+# C and a C++ compiler for the header of deploy/client/c; a browser for the dashboard, and its font; a display
+# without a screen, and hands for its keyboard and mouse, for the viewer.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=scripts/common.sh
@@ -30,6 +31,12 @@ fi
 if ! command -v chromium >/dev/null && ! command -v google-chrome >/dev/null; then
     apt_install "the browser of the dashboard's tests is missing" chromium
 fi
+if [ -z "$(find /usr/share/fonts /usr/local/share/fonts -name DejaVuSans.ttf -print -quit 2>/dev/null)" ]; then
+    apt_install "the font that the dashboard's pages fall back to is missing" fonts-dejavu-core
+fi
 if ! command -v cc >/dev/null || ! command -v g++ >/dev/null; then
     apt_install "a C and a C++ compiler are missing" gcc g++
+fi
+if ! command -v Xvfb >/dev/null || ! command -v xdotool >/dev/null; then
+    apt_install "the display of the viewer's tests is missing" xvfb xdotool
 fi

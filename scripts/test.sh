@@ -21,7 +21,7 @@ join() {
     cat "$said"
 }
 
-computing=(tests/integration/test_{build,cli,cli_bench,cli_remote,cli_render,retrain,stress_gl,zink}.py)
+computing=(tests/integration/test_{build,cli,cli_bench,cli_remote,cli_render,cli_view,retrain,stress_gl,web_client,zink}.py)
 computing+=(tests/integration/test_{labeller,predictors}_benchmark.py)
 
 beside tests/unit tests/property

@@ -15,7 +15,7 @@ from labeller.curves import Curves, composite, error_curves
 from labeller.rules import allocate_curves
 from renderer import metrics
 from renderer.capture import capture
-from renderer.frame import Frame
+from renderer.frame import RGB, Frame
 from renderer.gpu_scene import GpuScene
 from renderer.techniques import Budget, Rendered
 from schemas.bench import Yardstick
@@ -49,10 +49,11 @@ class Subject:
         gpu: The scene.
         view: The camera.
         size: Width and height.
+        background: Linear RGB where nothing is.
     """
 
-    def __init__(self, gpu: GpuScene, view: View, size: tuple[int, int]) -> None:
-        self.gpu, self.view, self.size = gpu, view, size
+    def __init__(self, gpu: GpuScene, view: View, size: tuple[int, int], background: RGB = (1.0, 1.0, 1.0)) -> None:
+        self.gpu, self.view, self.size, self.background = gpu, view, size, background
         self._curves: dict[tuple[TailName, float], Curves] = {}
         self._allocations: dict[tuple[TailName, float, int, str], Allocation] = {}
 
@@ -62,8 +63,8 @@ class Subject:
         return self.size[0] * self.size[1]
 
     def frame(self) -> Frame:
-        """The view anew: nothing that another technique left there is reused. White is where nothing is."""
-        return Frame(self.gpu, self.view, *self.size)
+        """The view anew: nothing that another technique left there is reused."""
+        return Frame(self.gpu, self.view, *self.size, self.background)
 
     @cached_property
     def dump(self) -> FragmentDump:
@@ -129,7 +130,7 @@ class Subject:
                     budget_factor=factor,
                     budget=found.budget,
                     mse=metrics.mse(display8(linear), self.exact8.reshape(-1, 3)),
-                    mse_display=self._display_error(linear),
+                    mse_display=self.display_error(linear),
                     gap=found.gap,
                     k_min=int(k.min(initial=np.iinfo(np.int32).max)) if len(k) else 0,
                     k_max=int(k.max(initial=0)),
@@ -150,7 +151,7 @@ class Subject:
         error = metrics.mse(image, self.exact8)
         return Errors(
             mse=error,
-            mse_display=self._display_error(linear),
+            mse_display=self.display_error(linear),
             mse_linear=float(np.mean(np.square(linear - self.exact, dtype=np.float64))),
             mse_occupied=_mse(image.reshape(-1, 3)[occupied], self.exact8.reshape(-1, 3)[occupied]),
             psnr=None if error == 0.0 else metrics.psnr(error),
@@ -158,7 +159,8 @@ class Subject:
             flip=metrics.flip(image, self.exact8)[0],
         )
 
-    def _display_error(self, linear: NDArray[np.floating]) -> float:
+    def display_error(self, linear: NDArray[np.floating]) -> float:
+        """Mean squared difference of sRGB values before rounding, of a picture as linear RGB, [P, 3]."""
         return float(np.mean(np.square(linear_to_srgb(linear) - self.exact_display, dtype=np.float64)))
 
 

@@ -37,6 +37,7 @@ from services.cli import (
     scenes,
     serve,
     stress,
+    view,
     worker,
     workers,
 )
@@ -51,6 +52,7 @@ app = typer.Typer(
 )
 app.command("build")(build.build)
 app.command("render")(render.render)
+app.command("view")(view.view)
 app.command("dump")(dump.dump)
 app.command("bench")(bench.bench)
 app.add_typer(scene.app, name="scene")

@@ -1,0 +1,151 @@
+"""`diaphane view`: two techniques on one camera, in a window or as frames."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from schemas.problem import Problem
+from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAIL_HELP
+from services.cli import output
+from services.cli.scene_options import (
+    WHITE,
+    AlphaOption,
+    BackgroundOption,
+    CameraOption,
+    ComplexityOption,
+    RefineOption,
+    SceneArgument,
+    SizeOption,
+    TimeOption,
+    VariantOption,
+    WidthOption,
+)
+from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption
+from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
+
+
+def view(
+    file: SceneArgument,
+    technique: Annotated[
+        str | None,
+        typer.Option("--technique", "-t", help="On the left. Default: kbuffer-deep with a bundle, else kbuffer."),
+    ] = None,
+    against: Annotated[str, typer.Option("--against", help="Technique on the right.")] = "sbuffer",
+    layout: Annotated[
+        str, typer.Option("--layout", help="single, side-by-side, split, difference or k; keys 1 to 5.")
+    ] = "side-by-side",
+    budget: Annotated[float, typer.Option("--budget", help="Fragments, as a multiple of width x height.")] = 2.0,
+    tail: Annotated[
+        str | None, typer.Option("--tail", help=f"{TAIL_HELP} Default: the bundle's, or {DEFAULT_TAIL}.")
+    ] = None,
+    g: Annotated[float, typer.Option("--g", help="Steepness of the density tail.")] = DENSITY_G,
+    model: Annotated[
+        str | None, typer.Option("--model", help="For kbuffer-deep: NAME@ALIAS of the server, fetched and verified.")
+    ] = None,
+    bundle: Annotated[
+        str | None, typer.Option("--bundle", help="Instead: a folder, or NAME@ALIAS of the state folder's registry.")
+    ] = None,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Take every bundle that the alias of --model comes to mean.")
+    ] = False,
+    inference: Annotated[
+        str, typer.Option("--inference", help="How kbuffer-deep runs its network: glsl or onnx.")
+    ] = "glsl",
+    vkb: Annotated[
+        str,
+        typer.Option("--vkb", help="For kbuffer-importance: thesis, no-depth, no-periphery, no-fresnel, no-noise."),
+    ] = "",
+    nodes: Annotated[int | None, typer.Option("--nodes", help="Nodes a pixel of multilayer and adaptive.")] = None,
+    samples: Annotated[int | None, typer.Option("--samples", help="Samples a pixel of stochastic.")] = None,
+    camera: CameraOption = None,
+    views: Annotated[Path | None, typer.Option("--views", help="JSON file with views of the scene.")] = None,
+    view: Annotated[
+        str | None, typer.Option("--view", help="Name of one of --views, or of a camera. Default: the first.")
+    ] = None,
+    image_width: WidthOption = 960,
+    picture_size: SizeOption = None,
+    time: TimeOption = None,
+    complexity: ComplexityOption = None,
+    refine: RefineOption = None,
+    alpha: AlphaOption = None,
+    variant: VariantOption = None,
+    background: BackgroundOption = WHITE,
+    frames: Annotated[
+        int | None, typer.Option("--frames", help="No window: so many frames of a full turn; 1: the view itself.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder of frames, pictures (key P) and statistics.csv (key C).")
+    ] = None,
+    csv: Annotated[Path | None, typer.Option("--csv", help="File that rows of statistics are added to.")] = None,
+    flip: Annotated[bool, typer.Option("--flip", help="FLIP as well: it takes longer.")] = False,
+    readout: Annotated[
+        bool | None, typer.Option("--readout/--no-readout", help="Numbers upon the picture. Default: in the window.")
+    ] = None,
+    state: StateOption = DEFAULT_STATE,
+    url: UrlOption = DEFAULT_URL,
+    key_file: KeyFileOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Look at a scene with two techniques: pictures, differences, k, times, bytes and errors. H lists the keys."""
+    from renderer.scene import LoadOptions
+    from services.options import check_bundle, parse_size, parse_tail
+    from services.progress import make_progress
+    from services.render_options import (
+        RenderOptions,
+        parse_background,
+        parse_needs,
+        parse_refine,
+        parse_techniques,
+    )
+    from services.viewer.model import Service
+    from services.viewer.options import ViewerOptions, parse_layout
+
+    check_bundle(model, "--model")
+    if model is not None and bundle is not None:
+        raise Problem("Both --model and --bundle name a bundle.", "Leave one of them out.")
+    if watch and (model is None or frames is not None):
+        raise Problem("--watch follows the alias of --model in a window.", "Give --model, and no --frames.")
+    has_bundle = model is not None or bundle is not None
+    options = ViewerOptions(
+        render=RenderOptions(
+            scenes=(file,),
+            techniques=parse_techniques([technique or ("kbuffer-deep" if has_bundle else "kbuffer")], has_bundle),
+            needs=parse_needs(vkb, inference, nodes, samples),
+            budget=budget,
+            tail=None if tail is None else parse_tail(tail),
+            g=g,
+            bundle=model or bundle,
+            camera=camera,
+            views=views,
+            image_width=image_width,
+            size=None if picture_size is None else parse_size(picture_size),
+            frames=() if time is None else (time,),
+            load=LoadOptions(alpha=alpha, variants=tuple(variant or ()), refine=parse_refine(complexity, refine)),
+            background=parse_background(background),
+            state=state,
+        ),
+        against=against,
+        layout=parse_layout(layout),
+        view=view,
+        frames=frames,
+        out=out,
+        csv=csv,
+        readout=frames is None if readout is None else readout,
+        perceptual=flip,
+    )
+    service = None
+    if model is not None:
+        from services.cli.remote import read_key
+
+        service = Service(model, url, read_key(key_file), state, watch)
+    from services.viewer.run import view as run
+
+    rows = run(options, service, make_progress(sys.stderr, silent=as_json))
+    if as_json:
+        output.print_json({"rows": rows})
+    elif frames is not None:
+        print(out)

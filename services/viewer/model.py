@@ -1,0 +1,124 @@
+"""The bundle that is shown: a folder, one of the local registry, or one of a service, followed while it is shown."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from schemas.problem import ExitCode, Problem
+from services.rendering import bundle_folder
+
+FETCHED = "bundles"
+"""Folder of fetched bundles, in that of the state."""
+_EVERY = 5.0
+"""Seconds between two questions for the alias; one about the same version costs an answer without a body."""
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """Where a model is fetched from.
+
+    Attributes:
+        reference: NAME@ALIAS.
+        url: The server.
+        key: API key; None: none.
+        state: Folder of the state, in which fetched bundles are kept.
+        follow: Whether later versions of the alias are fetched, too.
+    """
+
+    reference: str
+    url: str
+    key: str | None
+    state: Path
+    follow: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """The bundle, and those that come after it.
+
+    Attributes:
+        folder: Of the bundle; None: none was asked for.
+        name: As it is shown.
+        later: Folders of newer versions, from the thread that asks for them.
+    """
+
+    folder: Path | None
+    name: str
+    later: queue.SimpleQueue[Path]
+
+    def newest(self) -> Path | None:
+        """The last one that has come since this was asked last; None: no other one."""
+        found = None
+        while not self.later.empty():
+            found = self.later.get()
+        return found
+
+
+def fetched_name(name: str, folder: Path) -> str:
+    """NAME@VERSION of a fetched bundle, whose folder is named after its version."""
+    return f"{name.partition('@')[0]}@{folder.name}"
+
+
+@contextmanager
+def local_source(bundle: str | None, state: Path) -> Iterator[Source]:
+    """A bundle of this machine.
+
+    Args:
+        bundle: A folder, or NAME@ALIAS of the registry of `state`; None: none.
+        state: Folder of the state.
+    """
+    with bundle_folder(bundle, state) as folder:
+        yield Source(folder, bundle or "", queue.SimpleQueue())
+
+
+@contextmanager
+def remote_source(service: Service) -> Iterator[Source]:
+    """A bundle of a service, fetched and verified by the Python client.
+
+    Raises:
+        Problem: The client is not installed, or there is no such bundle, or it is not what was signed.
+    """
+    client = _client()
+    name, _, alias = service.reference.partition("@")
+    asked: dict[str, Any] = {"url": service.url, "key": service.key, "folder": service.state / FETCHED}
+    stop, later = threading.Event(), queue.SimpleQueue[Path]()
+    bundles = client.watch(name, alias or "champion", every=_EVERY, stop=stop, **asked)
+    try:
+        first = next(bundles)
+    except client.PullError as error:
+        raise Problem(error.what, error.remedy, _code(client, error)) from error
+
+    def listen() -> None:
+        for folder in bundles:
+            later.put(folder)
+
+    if service.follow:
+        threading.Thread(target=listen, name="watch", daemon=True).start()
+    try:
+        yield Source(first, fetched_name(name, first), later)
+    finally:
+        stop.set()
+
+
+def _client() -> Any:
+    """The package of deploy/client/python, a distribution of its own that nothing else here needs."""
+    try:
+        import diaphane_client
+    except ModuleNotFoundError as error:
+        raise Problem(
+            "A model of a service is fetched by the Python client, which is not installed.",
+            "Run `pip install ./deploy/client/python`, or name a folder with --bundle.",
+            ExitCode.CHECK_FAILED,
+        ) from error
+    return diaphane_client
+
+
+def _code(client: Any, error: Exception) -> ExitCode:
+    codes = {client.Unavailable: ExitCode.TRY_AGAIN, client.Denied: ExitCode.AUTH, client.NotFound: ExitCode.NOT_FOUND}
+    return codes.get(type(error), ExitCode.CHECK_FAILED)

@@ -1,0 +1,101 @@
+"""`diaphane view`: opens scene and bundle, then shows them in a window or writes frames."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from pathlib import Path
+
+from renderer.techniques import TECHNIQUES, KBufferDeep, technique
+from schemas.tail import DEFAULT_TAIL
+from services.progress import Progress
+from services.viewer import statistics
+from services.viewer.controls import Look, Place
+from services.viewer.headless import frames
+from services.viewer.layout import across
+from services.viewer.model import Service, Source, local_source, remote_source
+from services.viewer.options import Opened, ViewerOptions, opened
+from services.viewer.session import Session
+from services.viewer.statistics import Row
+from services.viewer.studio import Studio
+
+
+def view(options: ViewerOptions, service: Service | None, progress: Progress) -> list[Row]:
+    """Look at a scene.
+
+    Args:
+        options: What, and how.
+        service: Where the model is fetched from; None: the bundle is that of the options.
+        progress: Is told of warnings, frames and files.
+
+    Returns:
+        The statistics that were written.
+
+    Raises:
+        Problem: The scene or the bundle cannot be read, a frame cannot be rendered, or no window be opened.
+    """
+    if options.csv is not None:
+        statistics.check(options.csv)
+    asked = options.render
+    bundle: AbstractContextManager[Source] = (
+        local_source(asked.bundle, asked.state) if service is None else remote_source(service)
+    )
+    with bundle as source, opened(options) as scene:
+        for warning in scene.scene.now.scene.warnings:
+            progress.note(f"warning: {scene.scene.file}: {warning}")
+        options = _with_tail(options, source.folder)
+        if options.frames is not None:
+            return _write_frames(options, options.frames, scene, source, progress)
+        return _show(options, scene, source, progress)
+
+
+def _write_frames(options: ViewerOptions, count: int, scene: Opened, source: Source, progress: Progress) -> list[Row]:
+    session, place = _session(options, scene, source), _place(scene, source)
+    out = options.out or Path()
+    made = frames(session, place, count, out, options.csv, progress)
+    return [row for rows in made for row in rows]
+
+
+def _show(options: ViewerOptions, scene: Opened, source: Source, progress: Progress) -> list[Row]:
+    from services.viewer.window import Files, Viewer, open_window
+
+    # The window first: its context is the one that the scene is uploaded to.
+    width, height = scene.size
+    window = open_window((width * across(options.layout), height), scene.scene.file.name)
+    session, place = _session(options, scene, source), _place(scene, source)
+    viewer = Viewer(window, session, place, source, Files(options.out or Path(), options.csv, progress.note))
+    viewer.run()
+    return viewer.rows
+
+
+def _session(options: ViewerOptions, scene: Opened, source: Source) -> Session:
+    asked = options.render
+    studio = Studio(scene.scene.gpu(), replace(asked.needs, bundle=source.folder), asked.background, asked.g)
+    look = Look(
+        view=scene.views[0],
+        size=scene.size,
+        left=asked.techniques[0],
+        right=options.against,
+        factor=asked.budget,
+        tail=asked.tail or DEFAULT_TAIL,
+        layout=options.layout,
+        perceptual=options.perceptual,
+        readout=options.readout,
+    )
+    return Session(studio, look, scene.scene.file.stem, source.name)
+
+
+def _place(scene: Opened, source: Source) -> Place:
+    arrays = scene.scene.now.scene
+    names = [name for name in TECHNIQUES if name != "kbuffer-deep" or source.folder is not None]
+    return Place(names, scene.views, arrays.up, arrays.bounds)
+
+
+def _with_tail(options: ViewerOptions, bundle: Path | None) -> ViewerOptions:
+    """The same with the tail that the network was trained with, where there is one and none is asked for."""
+    if bundle is None or options.render.tail is not None:
+        return options
+    deep = technique("kbuffer-deep", replace(options.render.needs, bundle=bundle))
+    assert isinstance(deep, KBufferDeep)
+    trained = deep.manifest.tail
+    return replace(options, render=replace(options.render, tail=trained.name, g=trained.g))

@@ -1,0 +1,203 @@
+"""What a window and a folder of frames have in common: the pictures of a look, composed, with their numbers."""
+
+from __future__ import annotations
+
+import textwrap
+from dataclasses import dataclass, replace
+from itertools import count
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from renderer.techniques import TECHNIQUES
+from schemas.problem import Problem
+from schemas.view import View
+from services.report.colours import COUNT, HEAT
+from services.stages.pictures import write_png
+from services.viewer import statistics
+from services.viewer.controls import Look, key_help
+from services.viewer.layout import Pane, across, blank, compose, is_paired
+from services.viewer.overlay import Corner, Note, draw, in_columns
+from services.viewer.statistics import Row
+from services.viewer.studio import Compared, Shot, Studio, Wish
+from services.writing import replacing
+
+_WRAP = 44
+"""Letters of a line of the read-out."""
+_JOINED = "\N{NO-BREAK SPACE}"
+"""Between the name of a pass and its time, which stay on one line; the font has no such letter."""
+
+
+@dataclass(slots=True)
+class Session:
+    """A scene that is being looked at.
+
+    Attributes:
+        studio: Renders it.
+        look: What is shown.
+        name: Of the scene.
+        bundle: Name of the bundle that is read; empty: none.
+        message: What was done last; empty: nothing to say.
+    """
+
+    studio: Studio
+    look: Look
+    name: str
+    bundle: str
+    message: str = ""
+
+    def sides(self) -> dict[str, Shot | Problem]:
+        """The pictures that the layout shows, `left` and `right`, rendered if they are not there yet."""
+        look = self.look
+        names = {"left": look.left, **({"right": look.right} if is_paired(look.layout) else {})}
+        return {
+            side: self.studio.shot(Wish(name, look.view, look.size, look.factor, look.tail))
+            for side, name in names.items()
+        }
+
+    def image(self) -> NDArray[np.uint8]:
+        """The composition, without text."""
+        look, panes = self.look, self._panes()
+        if look.layout == "difference" and any(isinstance(shot, Problem) for shot in self.sides().values()):
+            return blank(*look.size).image
+        left = panes["left"]
+        return compose(look.layout, left, panes.get("right", left), look.split, look.gain, self._top())
+
+    def screen(self) -> NDArray[np.uint8]:
+        """The composition with the text that the look asks for."""
+        look = self.look
+        width, height = look.size[0] * across(look.layout), look.size[1]
+        notes = self._notes() if look.readout and not look.help else []
+        if look.help:
+            notes.append(Note(in_columns(key_help(), height), "middle", 0, width))
+        if self.message:
+            notes.append(Note(textwrap.wrap(self.message, _WRAP), "bottom-right", 0, width))
+        return draw(self.image(), notes)
+
+    def compare(self) -> bool:
+        """Compare what is shown with the exact picture; whether there was anything to compare."""
+        new = False
+        for shot in self.sides().values():
+            if isinstance(shot, Shot) and self._known(shot) is None:
+                self.studio.compare(shot, self.look.perceptual)
+                new = True
+        return new
+
+    def rows(self, frame: int) -> list[Row]:
+        """The numbers of what is shown, one row for each picture.
+
+        Raises:
+            Problem: A technique cannot render this.
+        """
+        return [
+            statistics.row(frame, side, shot, self.studio.compare(shot, self.look.perceptual), self._bundle(shot))
+            for side, shot in self._shots().items()
+        ]
+
+    def save(self, folder: Path) -> list[Path]:
+        """Write what is shown: the pictures by themselves, and the composition with its text.
+
+        Returns:
+            Their paths, of a number that nothing in the folder has yet.
+
+        Raises:
+            Problem: A technique cannot render this, or the folder cannot be written.
+        """
+        panes = {f"{side}-{shot.wish.technique}": shot.pane().image for side, shot in self._shots().items()}
+        stem = _free_stem(folder, self.name)
+        pictures = {stem: self.screen(), **{f"{stem}-{name}": image for name, image in panes.items()}}
+        paths = []
+        for name, image in pictures.items():
+            paths.append(folder / f"{name}.png")
+            with replacing(paths[-1]) as path:
+                write_png(path, image)
+        return paths
+
+    @property
+    def title(self) -> str:
+        """Of a window."""
+        look = self.look
+        names = " | ".join((look.left, look.right) if is_paired(look.layout) else (look.left,))
+        return f"{self.name} - {names} - {look.factor:g} fragments a pixel - Diaphane"
+
+    def show(self, view: View) -> None:
+        """Look from somewhere else."""
+        self.look = replace(self.look, view=view)
+
+    def _shots(self) -> dict[str, Shot]:
+        found: dict[str, Shot] = {}
+        for side, shot in self.sides().items():
+            if isinstance(shot, Problem):
+                raise shot
+            found[side] = shot
+        return found
+
+    def _panes(self) -> dict[str, Pane]:
+        shots = self.sides().items()
+        return {side: shot.pane() if isinstance(shot, Shot) else blank(*self.look.size) for side, shot in shots}
+
+    def _top(self) -> int:
+        """The k of the brightest colour: the greatest that a technique with a choice has.
+
+        An exact one keeps all fragments; on its scale the differences between the others would all be dark.
+        """
+        shots = [shot for shot in self.sides().values() if isinstance(shot, Shot)]
+        chosen = [shot for shot in shots if TECHNIQUES[shot.wish.technique].family != "exact"]
+        return max((int(shot.rendered.k.max(initial=0)) for shot in chosen or shots), default=1) or 1
+
+    def _known(self, shot: Shot) -> Compared | None:
+        return self.studio.known(shot, self.look.perceptual)
+
+    def _bundle(self, shot: Shot) -> str:
+        return self.bundle if shot.wish.technique == "kbuffer-deep" else ""
+
+    def _notes(self) -> list[Note]:
+        look, width = self.look, self.look.size[0]
+        # Upon one picture that shows two, each read-out has half of it.
+        parts = {"left": (0, width), "right": (width, width)}
+        if is_paired(look.layout) and across(look.layout) == 1:
+            parts = {"left": (0, width // 2), "right": (width // 2, width - width // 2)}
+        notes = []
+        for side, shot in self.sides().items():
+            corner: Corner = "top-right" if side == "right" and across(look.layout) == 1 else "top-left"
+            notes.append(Note(self._lines(side, shot), corner, *parts[side]))
+        if look.layout == "difference":
+            notes.append(Note([f"0 .. 1 of the difference x {look.gain:g}"], "bottom-left", 0, width, HEAT))
+        if look.layout == "k":
+            notes.append(Note([f"k 0 .. {self._top()}"], "bottom-left", 0, width, COUNT))
+        return notes
+
+    def _lines(self, side: str, shot: Shot | Problem) -> list[str]:
+        """The read-out of a picture."""
+        if isinstance(shot, Problem):
+            return [getattr(self.look, side), *textwrap.wrap(f"No picture: {shot.title} {shot.remedy}", _WRAP)]
+        wish, rendered = shot.wish, shot.rendered
+        lines = [f"{wish.technique} {self._bundle(shot)}".rstrip()]
+        if TECHNIQUES[wish.technique].family == "bounded":
+            lines.append(f"F {wish.factor:g} a pixel, {shot.budget.fragments:,}; tail {wish.tail}")
+        passes = ", ".join(f"{name}{_JOINED}{taken:.1f}" for name, taken in shot.recording.host.items())
+        times = textwrap.wrap(f"{shot.recording.milliseconds:.1f} ms: {passes}", _WRAP, break_on_hyphens=False)
+        lines += [line.replace(_JOINED, " ") for line in times]
+        compared = self._known(shot)
+        k = f"k up to {int(rendered.k.max(initial=0))}" if compared is None else "k {}..{}".format(*compared.k)
+        of = "" if compared is None else f" of {compared.fragments:,}"
+        lines.append(f"captured {rendered.captured:,}{of}, {k}")
+        lines.append(f"pool {rendered.pool_bytes / 2**20:.1f} MiB, {rendered.total_bytes / 2**20:.1f} MiB at most")
+        return [*lines, *(["against exact: when the camera rests"] if compared is None else _errors(compared))]
+
+
+def _free_stem(folder: Path, name: str) -> str:
+    """A name with the first number that no picture of the folder has."""
+    there = {path.name for path in folder.glob("*.png")}
+    for number in count(1):
+        stem = f"{name}-{number:03}"
+        if not any(other.startswith(stem) for other in there):
+            return stem
+    raise AssertionError
+
+
+def _errors(compared: Compared) -> list[str]:
+    psnr = "no error" if compared.psnr is None else f"PSNR {compared.psnr:.2f} dB"
+    mse = f"against exact: MSE {1e5 * compared.mse:.4g} x1e-5, {psnr}"
+    return [mse] if compared.flip is None else [mse, f"FLIP {compared.flip:.4g}"]
