@@ -6,8 +6,7 @@ import flip_evaluator
 import numpy as np
 from numpy.typing import NDArray
 
-PIXELS_PER_DEGREE = 67.02
-"""FLIP's default viewer: 0.7 m from a screen of 0.7 m and 3840 pixels."""
+from renderer.reference.flip import PIXELS_PER_DEGREE
 
 _REACH = 24
 """Pixels, more than twice the radius of FLIP's largest filter (3 x .045 degrees)."""

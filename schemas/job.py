@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
@@ -29,6 +29,10 @@ ModelReference = Annotated[
 ]
 SceneId = Annotated[str, StringConstraints(pattern=r"^scn_[0-9a-f]{32}$")]
 DatasetId = Annotated[str, StringConstraints(pattern=r"^dst_[0-9a-f]{32}$")]
+
+SCRATCH: Final = "scratch"
+OWN_CHAMPION: Final = "champion"
+"""What `JobSpec.start_from` can be beside a reference."""
 
 _STRICT = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -75,7 +79,13 @@ class JobSpec(BaseModel):
         network: How much the network reads and computes a pixel.
         seed: Seed of everything drawn at random.
         steps: Optimiser steps; None: the trainer's default.
-        start_from: Weights that the training begins with: drawn by the seed, or those of the name's champion.
+        start_from: Network that the training begins with: `scratch` is none, the weights are drawn by the seed;
+            `champion` is that of the job's own name, if there is one yet; else a version, as in `model`. What an alias
+            means is decided when the job is submitted: its record names the version.
+        replay: Whether what `start_from` was trained on is trained on again, so that it is not forgotten: the views of
+            scenes that the job does not have itself.
+        patience: Validations without a better score after which the training stops; 0: never. A fifth of the training
+            scenes is kept out for that.
         promote: Whether a better version becomes the champion, or stays a candidate; a key without the scope `publish`
             gets the latter.
         priority: Class of the job's tasks in the queues; within a class, jobs share fairly.
@@ -100,9 +110,16 @@ class JobSpec(BaseModel):
     network: NetworkSize = DEFAULT_NETWORK
     seed: int = Field(default=0, ge=0, le=2**31 - 1)
     steps: Annotated[int, Field(ge=1, le=LIMITS.steps)] | None = None
-    start_from: Literal["scratch", "champion"] = "scratch"
+    start_from: ModelReference = SCRATCH
+    replay: bool = True
+    patience: int = Field(default=0, ge=0, le=LIMITS.steps)
     promote: Literal["if-better", "never"] = "if-better"
     priority: Priority = "normal"
+
+    @property
+    def begins_with(self) -> str | None:
+        """The version that is begun with; None if there is none, or which one it is has to be found out."""
+        return None if self.start_from in (SCRATCH, OWN_CHAMPION) else self.start_from
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -110,6 +127,8 @@ class JobSpec(BaseModel):
             raise ValueError(f"a {self.kind} needs a name")
         if self.kind == "evaluate" and self.model is None:
             raise ValueError("an evaluate needs a model")
+        if self.begins_with is not None and self.kind not in ("build", "train"):
+            raise ValueError(f"a {self.kind} trains nothing, so there is nothing to start from")
         if self.dataset is not None and (self.kind != "train" or self.scenes):
             raise ValueError("a data set is for a train without scenes")
         if self.dataset is None and not self.scenes:

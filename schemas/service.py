@@ -104,7 +104,7 @@ class JobRecord(_Record):
         id: `job_` and 24 hex digits.
         kind: What it makes.
         name: Bundle that it publishes.
-        spec: As submitted.
+        spec: As submitted, with the version that it begins with in the place of its alias.
         state: Where it is.
         attempt: 1, and one more for each retry.
         stage: Stage under way.

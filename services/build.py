@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from schemas.network import DEFAULT_NETWORK
+from schemas.pixel_weights import DEFAULT_WEIGHTS
 from services import pipeline
 from services.inline import InlineRunner
 from services.local import open_local
@@ -85,6 +86,7 @@ def command_line(options: BuildOptions) -> str:
     parts += ["--steps", str(options.steps)] if options.steps is not None else []
     parts += ["--network", options.network] if options.network != DEFAULT_NETWORK else []
     parts += ["--patience", str(options.patience)] if options.patience else []
+    parts += ["--weights", options.weights] if options.weights != DEFAULT_WEIGHTS else []
     parts += ["--from", options.start] if options.start is not None else []
     parts += ["--replay", str(options.replay)] if options.replay is not None else []
     return shlex.join(parts)

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from schemas.limits import LIMITS
 from schemas.network import DEFAULT_NETWORK, SIZES, NetworkSize
+from schemas.pixel_weights import DEFAULT_WEIGHTS, PIXEL_WEIGHTS, PixelWeights
 from schemas.problem import ExitCode, Problem
 from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAILS, TailName
 from services.registry import check_name
@@ -42,6 +43,7 @@ class BuildOptions:
         steps: Optimiser steps; None: the trainer's default.
         network: Size of the network.
         patience: Validations without a better score after which the training stops; 0: never.
+        weights: What a pixel's errors count in the rows that are trained on.
         start: Bundle whose weights the training begins with: a folder, or a reference of the registry.
         replay: Folder of a data set that is trained on as well, so that `start` does not forget it; None: that of the
             bundle's name, where there is one.
@@ -66,6 +68,7 @@ class BuildOptions:
     steps: int | None = None
     network: NetworkSize = DEFAULT_NETWORK
     patience: int = 0
+    weights: PixelWeights = DEFAULT_WEIGHTS
     start: str | None = None
     replay: Path | None = None
     state: Path = field(default=Path(".diaphane"))
@@ -186,6 +189,18 @@ def parse_network(text: str) -> NetworkSize:
         if size == text:
             return size
     raise Problem(f"There is no network '{text}'.", f"Use one of {', '.join(SIZES)}: --network {DEFAULT_NETWORK}.")
+
+
+def parse_weights(text: str) -> PixelWeights:
+    """The weights of that name.
+
+    Raises:
+        Problem: There are none.
+    """
+    for weights in PIXEL_WEIGHTS:
+        if weights == text:
+            return weights
+    raise Problem(f"There are no weights '{text}'.", f"Use one of {', '.join(PIXEL_WEIGHTS)}: --weights flip.")
 
 
 def default_holdout(scenes: Sequence[Path]) -> tuple[Path, ...]:

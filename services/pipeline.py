@@ -12,6 +12,8 @@ from schemas.measurement import Measurement, RegistryResult, SceneSummary
 from schemas.problem import ExitCode, Problem
 from schemas.service import SceneRecord, ShardRef
 from services import steps, summary
+from services.acceptance import begun_plan
+from services.fine_tuning import without_champion
 from services.plan import Plan, plan_of_job, source_of_version
 from services.records import Bundle, EvaluatedView, LabelledView, RenderedView, SceneEntry
 from services.registry import Publication
@@ -111,7 +113,7 @@ def run_job(spec: JobSpec, scenes: Mapping[str, SceneRecord], runner: Runner, jo
     Raises:
         Problem: Bad input, or a check that does not hold.
     """
-    plan = plan_of_job(spec, scenes)
+    plan = begun_plan(spec, plan_of_job(spec, scenes), runner.registry, runner.measured, runner.store).plan
     if spec.kind == "build":
         return _build_job(plan, runner, job)
     if spec.kind == "train" and spec.dataset is not None:
@@ -176,7 +178,8 @@ def _train_on_dataset(plan: Plan, runner: Runner, dataset: str) -> dict[str, Any
     shards = [(shard.scene_digest, shard.artifact) for shard in record.shards]
     scenes = {shard.scene: shard.scene_digest for shard in record.shards}
     start = _start(plan, runner, _champion(plan, runner))
-    bundle = steps.learn(plan.described_by(record.settings), runner, shards, scenes, {}, start)
+    plan = plan.described_by(record.settings)
+    bundle = steps.learn(plan, runner, shards, _all_learned(plan, scenes), {}, start)
     return {"dataset": dataset, **_publish_unscored(runner, bundle)}
 
 
@@ -193,10 +196,15 @@ def _learn(
     trained, held_out = (
         {scene.label: scene.digest for scene in scenes if scene.held_out == held} for held in (False, True)
     )
+    return steps.learn(plan, runner, shards, _all_learned(plan, trained), held_out, _start(plan, runner, champion))
+
+
+def _all_learned(plan: Plan, trained: Mapping[str, str]) -> dict[str, str]:
+    """Label -> digest of what a network has learned when it has been trained, now and before."""
     # A scene that was learned under a name which another one has now keeps a name of its own.
     known = {label if label not in trained else f"{label}@{d[:8]}": d for label, d in plan.learned.items()}
     known = {label: digest for label, digest in known.items() if digest not in trained.values()}
-    return steps.learn(plan, runner, shards, {**known, **trained}, held_out, _start(plan, runner, champion))
+    return {**known, **trained}
 
 
 def _champion(plan: Plan, runner: Runner) -> Publication | None:
@@ -219,7 +227,7 @@ def _start(plan: Plan, runner: Runner, champion: Publication | None) -> Source |
     if plan.start is not None or not plan.from_champion:
         return plan.start
     if champion is None:
-        runner.progress.note(f"{plan.name} has no champion yet: the training begins from scratch.")
+        runner.progress.note(without_champion(plan.name))
         return None
     return source_of_version(runner.registry.record(champion))
 

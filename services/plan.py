@@ -9,6 +9,7 @@ from typing import Any
 
 from schemas.job import JobSpec
 from schemas.network import DEFAULT_NETWORK, NetworkSize
+from schemas.pixel_weights import DEFAULT_WEIGHTS, PixelWeights
 from schemas.service import SceneRecord, VersionRecord
 from schemas.tail import TailName
 from schemas.view import ListedView
@@ -53,9 +54,11 @@ class Plan:
         from_champion: Whether the training begins with the champion's weights.
         promote: Whether a better version becomes the champion.
         patience: Validations without a better score after which the training stops; 0: never.
+        weights: What a pixel's errors count in the rows that are trained on.
         start: Bundle whose weights the training begins with; None: see `from_champion`.
-        replay: Shards of an earlier data set that are trained on as well.
-        learned: Label -> digest of what `start` and `replay` know, for provenance.
+        replay: Shards of an earlier data set in a folder that are trained on as well.
+        replayed: Digest of the scene and label artifact of every shard of earlier jobs that is trained on as well.
+        learned: Label -> digest of what was learned before, for provenance.
     """
 
     name: str
@@ -73,8 +76,10 @@ class Plan:
     from_champion: bool = False
     promote: bool = True
     patience: int = 0
+    weights: PixelWeights = DEFAULT_WEIGHTS
     start: Source | None = None
     replay: Source | None = None
+    replayed: tuple[tuple[str, str], ...] = ()
     learned: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -92,6 +97,7 @@ class Plan:
             "tail": self.tail,
             "g": self.g,
             "seed": self.seed,
+            **({"weights": self.weights} if self.weights != DEFAULT_WEIGHTS else {}),
         }
 
     def described_by(self, settings: Mapping[str, Any]) -> Plan:
@@ -105,6 +111,7 @@ class Plan:
             factors=tuple(settings["budgets"]),
             tail=settings["tail"],
             g=settings["g"],
+            weights=settings.get("weights", DEFAULT_WEIGHTS),
         )
 
 
@@ -138,6 +145,7 @@ def plan_of_build(options: BuildOptions) -> Plan:
         steps=options.steps,
         network=options.network,
         patience=options.patience,
+        weights=options.weights,
     )
 
 
@@ -168,6 +176,7 @@ def plan_of_job(spec: JobSpec, scenes: Mapping[str, SceneRecord]) -> Plan:
         seed=spec.seed,
         steps=spec.steps,
         network=spec.network,
+        patience=spec.patience,
         from_champion=spec.start_from == "champion",
         promote=spec.promote == "if-better",
     )

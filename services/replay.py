@@ -1,10 +1,6 @@
-"""Fine-tuning: the network that a training begins with, and the data set that is replayed so that it is not forgotten.
+"""Fine-tuning of a local build: the network that it begins with, and the data set on disk that it replays.
 
-Rules:
-- a scene is replayed only if the build does not have it, by name or by content: its new version takes its place;
-- what was held out is never replayed, and what the network was trained on cannot be held out: its score would prove
-  nothing;
-- labels of another tail, metric or sample are not mixed.
+The rules are those of `services.fine_tuning`.
 """
 
 from __future__ import annotations
@@ -12,12 +8,13 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from labeller.dataset import Dataset, open_dataset
 from labeller.dataset_index import INDEX, Labels, ShardEntry
 from labeller.sampling import Sampling
 from schemas.bundle import Manifest, load_manifest
-from schemas.problem import ExitCode, Problem
+from services.fine_tuning import check_labels, is_replayed, refuse_known, scenes_of
 from services.options import BuildOptions
 from services.plan import Plan, source_of_version
 from services.progress import Progress
@@ -86,7 +83,7 @@ def fine_tuning(
     else:
         seen |= {entry.asset: entry.source.scene for entry in replay.entries}
         plan = replace(plan, replay=replay.source)
-    _refuse_known(plan, seen)
+    refuse_known(plan.scenes, set(seen.values()))
     return replace(plan, learned=seen), replay
 
 
@@ -103,37 +100,25 @@ def _bundle(reference: str, registry: Registry) -> tuple[Source, Manifest]:
 def _replay(folder: Path, plan: Plan) -> Replay | None:
     """The shards to train on again; None if the build has all of their scenes."""
     dataset = open_dataset(folder)
-    made, asked = (
-        (dataset.index.labels, dataset.index.sampling),
-        (Labels(tail=plan.tail, g=plan.g, metric=METRIC, k_min=1), Sampling(seed=plan.seed)),
-    )
-    if made != asked:
-        labels, sampling = made
-        raise Problem(
-            f"The data set {folder} is labelled otherwise than this build (tail {plan.tail}, g {plan.g:g}, seed "
-            f"{plan.seed}): tail {labels.tail}, g {labels.g:g}, seed {sampling.seed}.",
-            "Give the build its --tail, --g and --seed, or another data set with --replay.",
-        )
-    names, digests = _own(plan)
+    own = scenes_of(plan)
     entries = tuple(
         entry
         for entry in dataset.index.shards
-        if entry.split == "train" and entry.asset not in names and entry.source.scene not in digests
+        if entry.split == "train" and is_replayed(own, entry.asset, entry.source.scene)
     )
-    return Replay(dataset, entries) if entries else None
+    if not entries:
+        return None
+    check_labels(
+        f"The data set {folder}",
+        _settings(dataset.index.labels, dataset.index.sampling),
+        _settings(
+            Labels(tail=plan.tail, g=plan.g, metric=METRIC, k_min=1, weights=plan.weights), Sampling(seed=plan.seed)
+        ),
+        "Give the build its --tail, --g, --seed and --weights, or another data set with --replay.",
+    )
+    return Replay(dataset, entries)
 
 
-def _refuse_known(plan: Plan, seen: dict[str, str]) -> None:
-    known = set(seen.values())
-    for scene in plan.scenes:
-        if scene.held_out and scene.source.digest in known:
-            raise Problem(
-                f"The scene {scene.label} is held out, but the network that is begun with was trained on it.",
-                "Hold out another one with --holdout: a test on what was trained on proves nothing.",
-                ExitCode.CHECK_FAILED,
-            )
-
-
-def _own(plan: Plan) -> tuple[set[str], set[str]]:
-    """Names and digests of the build's own scenes."""
-    return {scene.label for scene in plan.scenes}, {scene.source.digest for scene in plan.scenes}
+def _settings(labels: Labels, sampling: Sampling) -> dict[str, Any]:
+    """Every setting by name."""
+    return {name: getattr(part, name) for part in (labels, sampling) for name in type(part).model_fields}

@@ -199,6 +199,18 @@ class Store:
         _touch(folder)
         return content
 
+    def made_from(self, artifact: str) -> Address:
+        """What the artifact `stage/key` was made from: whoever knows its name can go on to what it read.
+
+        Raises:
+            MissingArtifact: It is absent, or its meta.json is damaged.
+        """
+        try:
+            meta = read_meta(self._folder(artifact), artifact)
+        except (OSError, ValueError) as error:
+            raise MissingArtifact(artifact) from error
+        return Address(meta["stage"], meta["version"], meta["inputs"], meta["params"])
+
     def push(self, address: Address) -> None:
         """Makes a local artifact known to the other machines: nothing to do where all share this folder."""
 

@@ -7,9 +7,10 @@ and small facts pass between them, everything else goes through the store.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, model_validator
 
 from services.progress import Progress
 from services.store import Address, Store
@@ -34,6 +35,20 @@ STAGE_ROLE: Mapping[str, Role] = {
     "report": "render",
 }
 """Which kind of worker a stage needs: `render` has OpenGL and USD, `label` numba, `train` torch and OpenGL."""
+
+STAGE_NEEDS: Mapping[StageName, tuple[StageName, ...]] = {
+    "scene": (),
+    "render": ("scene",),
+    "label": ("render",),
+    "train": ("label",),
+    "export": ("train",),
+    "evaluate": ("label", "export"),
+    "report": ("evaluate",),
+}
+"""Stage -> the stages that come right before it, each stage after those that it needs.
+
+A task may only need artifacts of stages that come before its own, right before or further back.
+"""
 
 FACTS = "facts.json"
 """File of every artifact with what the pipeline has to know of it: small, JSON."""
@@ -71,7 +86,7 @@ class Task(BaseModel):
         needs: Artifacts that are read, as `stage/key`.
         scene: The scene, where the stage reads it.
         bundle: The published bundle, where the stage renders one that is no artifact.
-        replay: Folder of a data set, and the shards of it that a training replays.
+        replay: Folder of a data set, and the shards of it that a training replays beside those that its inputs name.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -85,6 +100,13 @@ class Task(BaseModel):
     scene: Source | None = None
     bundle: Source | None = None
     replay: Source | None = None
+
+    @model_validator(mode="after")
+    def _needs_earlier_stages(self) -> Task:
+        later = {need.partition("/")[0] for need in self.needs} - _before(self.stage)
+        if later:
+            raise ValueError(f"the stage {self.stage} does not come after {', '.join(sorted(later))}")
+        return self
 
     @property
     def address(self) -> Address:
@@ -100,6 +122,12 @@ class Task(BaseModel):
     def role(self) -> Role:
         """Which kind of worker does it."""
         return STAGE_ROLE[self.stage]
+
+
+@cache
+def _before(stage: StageName) -> frozenset[str]:
+    """All stages that come before one."""
+    return frozenset(STAGE_NEEDS[stage]).union(*map(_before, STAGE_NEEDS[stage]))
 
 
 Report = Callable[[float, str], None]

@@ -11,11 +11,13 @@
 #   RETRAIN_HOLDOUT         scenes to evaluate on and never train on, the same way
 #   RETRAIN_MAX_REGRESSION  fraction by which an error may exceed the champion's (0.05)
 #   RETRAIN_BASELINE        champion, or none: nothing is compared (champion)
-#   RETRAIN_START_FROM      weights that the training begins with: champion or scratch (champion)
+#   RETRAIN_START_FROM      network that the training begins with: champion, scratch, or NAME@ALIAS (champion)
+#   RETRAIN_REPLAY          false: do not train again on what that network was trained on (true)
 #   RETRAIN_PROMOTE         true: a better version becomes the champion, else it stays a candidate (false)
 #   RETRAIN_SUMMARY         file that the Markdown table for the pull request is written to
 #   RETRAIN_BUDGETS, RETRAIN_SIZE, RETRAIN_ALPHA, RETRAIN_VIEWS, RETRAIN_VIEWS_PER_SCENE, RETRAIN_SEED, RETRAIN_STEPS,
-#   RETRAIN_PRIORITY        as the options of `diaphane retrain`; empty: its defaults
+#   RETRAIN_PATIENCE, RETRAIN_PRIORITY
+#                           as the options of `diaphane retrain`; empty: its defaults
 #
 # Arguments of the script are passed on to `diaphane retrain` as well. Exit status: 0 passed, 1 worse or failed, others
 # as `diaphane` documents them.
@@ -37,10 +39,10 @@ set -- retrain "$@" --name="$RETRAIN_NAME"
 
 # An empty value is the same as none: that is what an input without a value looks like.
 for option in max-regression="${RETRAIN_MAX_REGRESSION:-}" baseline="${RETRAIN_BASELINE:-}" \
-    start-from="${RETRAIN_START_FROM:-}" summary="${RETRAIN_SUMMARY:-}" budgets="${RETRAIN_BUDGETS:-}" \
+    from="${RETRAIN_START_FROM:-}" summary="${RETRAIN_SUMMARY:-}" budgets="${RETRAIN_BUDGETS:-}" \
     size="${RETRAIN_SIZE:-}" alpha="${RETRAIN_ALPHA:-}" views="${RETRAIN_VIEWS:-}" \
     views-per-scene="${RETRAIN_VIEWS_PER_SCENE:-}" seed="${RETRAIN_SEED:-}" steps="${RETRAIN_STEPS:-}" \
-    priority="${RETRAIN_PRIORITY:-}"; do
+    patience="${RETRAIN_PATIENCE:-}" priority="${RETRAIN_PRIORITY:-}"; do
     [ -z "${option#*=}" ] || set -- "$@" "--$option"
 done
 
@@ -48,6 +50,12 @@ case "${RETRAIN_PROMOTE:-false}" in
     true) set -- "$@" --promote ;;
     false) ;;
     *) die "RETRAIN_PROMOTE is '$RETRAIN_PROMOTE': use true or false." ;;
+esac
+
+case "${RETRAIN_REPLAY:-true}" in
+    true) ;;
+    false) set -- "$@" --no-replay ;;
+    *) die "RETRAIN_REPLAY is '$RETRAIN_REPLAY': use true or false." ;;
 esac
 
 # Prints a file or id on each line. A line that is no file is a pattern: with no field separators, an unquoted line is

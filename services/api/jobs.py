@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import AsyncIterator, Callable
-from typing import Annotated
+from typing import Annotated, Any
 
 from anyio import to_thread
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
 
 from schemas.job import JobKind, JobSpec, JobState, TaskState
 from schemas.problem import ExitCode, Problem
-from schemas.service import JobRecord, KeyRecord, TaskRecord
+from schemas.service import JobRecord, KeyRecord, SceneRecord, TaskRecord
+from services.acceptance import accept
 from services.api.answers import EventPage, JobPage, TaskPage
 from services.api.body import JsonBody
 from services.api.feeds import LISTENERS, Feeds
@@ -54,11 +55,13 @@ def submit_job(
     ] = None,
 ) -> JobRecord:
     """Submits a job."""
-    _require_accepted(service, body)
+    scenes = _require_accepted(service, body)
     spec = _within_scope(body, caller)
-    record, new = service.jobs.submit(
-        spec, submitted_by=caller.id, idempotency_key=idempotency_key, request_id=request.state.request_id
-    )
+    named: dict[str, Any] = {"submitted_by": caller.id, "idempotency_key": idempotency_key}
+    record, new = service.jobs.repeated(spec, **named), False
+    if record is None:
+        accepted = accept(spec, scenes, service.registry, service.measured, service.storage.store)
+        record, new = service.jobs.submit(spec, **named, request_id=request.state.request_id, accepted=accepted)
     response.headers["Location"] = f"/v1/jobs/{record.id}"
     response.status_code = 202 if new else 200
     return record
@@ -201,8 +204,8 @@ def last_number(header: str, after: int) -> int:
     return int(header)
 
 
-def _require_accepted(service: Service, spec: JobSpec) -> None:
-    """Before anything is queued.
+def _require_accepted(service: Service, spec: JobSpec) -> dict[str, SceneRecord]:
+    """The scenes of a job, before anything is queued.
 
     Raises:
         Problem: A scene does not exist.
@@ -218,3 +221,4 @@ def _require_accepted(service: Service, spec: JobSpec) -> None:
         service.measured.dataset(spec.dataset)
     if spec.model is not None:
         service.registry.resolve(spec.model)
+    return known

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from schemas.network import DEFAULT_NETWORK
+from schemas.pixel_weights import DEFAULT_WEIGHTS
 from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAIL_HELP
 from services.cli import output
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
@@ -44,6 +45,9 @@ def build(
     patience: Annotated[
         int, typer.Option("--patience", help="Stop after so many validations without a better score; 0: never.")
     ] = 0,
+    weights: Annotated[
+        str, typer.Option("--weights", help="What a pixel's errors count in training: none (all alike) or flip.")
+    ] = DEFAULT_WEIGHTS,
     start: Annotated[
         str | None, typer.Option("--from", help="Bundle to begin with: a folder, or NAME@ALIAS of the registry.")
     ] = None,
@@ -54,7 +58,7 @@ def build(
     as_json: JsonOption = False,
 ) -> None:
     """Render, label, train, evaluate, publish and report. The same command again continues, or finds it all done."""
-    from services.options import BuildOptions, parse_budgets, parse_network, parse_size, parse_tail
+    from services.options import BuildOptions, parse_budgets, parse_network, parse_size, parse_tail, parse_weights
     from services.progress import make_progress
 
     width, height = parse_size(size)
@@ -74,6 +78,7 @@ def build(
         steps=steps,
         network=parse_network(network),
         patience=patience,
+        weights=parse_weights(weights),
         start=start,
         replay=replay,
         state=state,

@@ -20,6 +20,8 @@ from services.cli.submit import (
     AlphaOption,
     BudgetsOption,
     NetworkOption,
+    NoReplayOption,
+    PatienceOption,
     PriorityOption,
     SeedOption,
     SizeOption,
@@ -36,7 +38,7 @@ if TYPE_CHECKING:
     from services.cli.comparison import Comparison
     from services.cli.remote import Remote
 
-CHAMPION = "champion"
+CHAMPION, SCRATCH = "champion", "scratch"
 _SHOWN_TASKS = 5
 
 
@@ -50,7 +52,12 @@ def retrain(
         float, typer.Option("--max-regression", help="Fraction by which an error may exceed the champion's.")
     ] = 0.05,
     baseline: Annotated[str, typer.Option("--baseline", help="champion, or none: nothing is compared.")] = CHAMPION,
-    start_from: Annotated[str, typer.Option("--start-from", help="Weights: champion or scratch.")] = CHAMPION,
+    start: Annotated[
+        str,
+        typer.Option("--from", "--start-from", help="champion (the name's own), scratch, or NAME@ALIAS to begin with."),
+    ] = CHAMPION,
+    is_forgotten: NoReplayOption = False,
+    patience: PatienceOption = None,
     is_promoted: Annotated[bool, typer.Option("--promote", help="Make it the champion if it is better.")] = False,
     summary: Annotated[Path | None, typer.Option("--summary", help="File that the Markdown table goes to.")] = None,
     budgets: BudgetsOption = None,
@@ -72,7 +79,7 @@ def retrain(
 
     The same scenes again find the same job. The new version stays a candidate unless --promote is given.
     """
-    _check(max_regression, baseline, start_from)
+    _check(max_regression, baseline)
     fields = job_fields(
         budgets=budgets,
         alpha=alpha,
@@ -83,12 +90,13 @@ def retrain(
         seed=seed,
         network=network,
         steps=steps,
+        patience=patience,
         priority=priority,
     )
     remote = connect(url, key_file)
     champion = _champion(remote, name)
     fields |= {"kind": "build", "name": name, "promote": "never"}
-    fields["start_from"] = start_from if champion is not None else "scratch"
+    fields |= {"start_from": _start(remote, start, champion), "replay": not is_forgotten}
     spec = _with_scenes(remote, fields, scenes, holdout, views, silent=as_json)
     job, rival = _finished(remote, spec, champion, silent=as_json)
     comparison = _compare(remote, job, spec, rival if baseline == CHAMPION else None)
@@ -109,15 +117,22 @@ def retrain(
         )
 
 
-def _check(max_regression: float, baseline: str, start_from: str) -> None:
+def _check(max_regression: float, baseline: str) -> None:
     if not (math.isfinite(max_regression) and max_regression >= 0.0):
         raise Problem(f"--max-regression {max_regression} is not a fraction.", "Write it like --max-regression 0.05.")
-    for option, value, known in (
-        ("baseline", baseline, (CHAMPION, "none")),
-        ("start-from", start_from, (CHAMPION, "scratch")),
-    ):
-        if value not in known:
-            raise Problem(f"--{option} '{value}' is not known.", f"Choose {' or '.join(known)}.")
+    if baseline not in (CHAMPION, "none"):
+        raise Problem(f"--baseline '{baseline}' is not known.", f"Choose {CHAMPION} or none.")
+
+
+def _start(remote: Remote, start: str, champion: dict[str, Any] | None) -> str:
+    """What the job is told to begin with: a version in the place of an alias, so that a repeated run means the same."""
+    if start == CHAMPION:
+        return SCRATCH if champion is None else CHAMPION
+    if start == SCRATCH:
+        return SCRATCH
+    name, _, selector = start.partition("@")
+    version = remote.version(name, selector or CHAMPION)["version"]
+    return f"{name}@{version}"
 
 
 def _champion(remote: Remote, name: str) -> dict[str, Any] | None:
@@ -186,9 +201,14 @@ def _job_of(remote: Remote, version: dict[str, Any] | None, spec: Mapping[str, A
         if refused.code is ExitCode.NOT_FOUND:  # jobs are removed by age
             return None
         raise
-    # The first version had no champion to start from; all else has to be the same.
     mine, its = ({**s, "start_from": None, "priority": None} for s in (spec, job["spec"]))
-    return job if job["state"] == "succeeded" and mine == its else None
+    same = mine == its and _began_alike(str(spec["name"]), spec["start_from"], job["spec"]["start_from"])
+    return job if job["state"] == "succeeded" and same else None
+
+
+def _began_alike(name: str, start: str, its: str) -> bool:
+    """Whether a job began with what is asked for: the champion of its time, which the first version did not have."""
+    return start == its or (start == CHAMPION and (its == SCRATCH or its.startswith(f"{name}@")))
 
 
 def _before(remote: Remote, name: str, version: str) -> str | None:

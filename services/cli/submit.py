@@ -32,6 +32,12 @@ SteepnessOption = Annotated[float | None, typer.Option("--g", help="Steepness of
 SeedOption = Annotated[int | None, typer.Option("--seed", help="Seed of everything drawn at random.")]
 NetworkOption = Annotated[str | None, typer.Option("--network", help="Size of the network: tiny, small or full.")]
 StepsOption = Annotated[int | None, typer.Option("--steps", help="Optimiser steps.")]
+NoReplayOption = Annotated[
+    bool, typer.Option("--no-replay", help="Do not train again on what --from was trained on: it may be forgotten.")
+]
+PatienceOption = Annotated[
+    int | None, typer.Option("--patience", help="Stop after so many validations without a better score; 0: never.")
+]
 PriorityOption = Annotated[str | None, typer.Option("--priority", help="low, normal or high.")]
 
 
@@ -57,7 +63,12 @@ def submit(
     seed: SeedOption = None,
     network: NetworkOption = None,
     steps: StepsOption = None,
-    start_from: Annotated[str | None, typer.Option("--start-from", help="Weights: scratch or champion.")] = None,
+    start: Annotated[
+        str | None,
+        typer.Option("--from", "--start-from", help="scratch, champion (the name's own), or NAME@ALIAS to begin with."),
+    ] = None,
+    is_forgotten: NoReplayOption = False,
+    patience: PatienceOption = None,
     promote: Annotated[str | None, typer.Option("--promote", help="if-better or never.")] = None,
     priority: PriorityOption = None,
     idempotency_key: Annotated[
@@ -83,9 +94,11 @@ def submit(
         seed=seed,
         network=network,
         steps=steps,
+        patience=patience,
         priority=priority,
     )
-    named = {"name": name, "dataset": dataset, "model": model, "start_from": start_from, "promote": promote}
+    named = {"name": name, "dataset": dataset, "model": model, "start_from": start, "promote": promote}
+    fields |= {"replay": False} if is_forgotten else {}
     fields |= {field: value for field, value in named.items() if value is not None}
     inputs = named_scenes(scene or (), holdout or ())
     # Everything but the scenes' ids is checked before anything is uploaded.

@@ -17,9 +17,11 @@ from sqlalchemy.exc import IntegrityError
 from schemas.job import JobKind, JobSpec, JobState, TaskState
 from schemas.problem import ExitCode, Problem
 from schemas.service import EventRecord, ExecutorRecord, JobRecord, QueueRecord, TaskRecord
+from services.acceptance import Accepted
 from services.clock import iso
 from services.database import Database, tables
 from services.engine import events, progress, queues, states, system
+from services.engine.events import Event
 from services.engine.liveness import clock
 from services.settings import Settings
 from services.store import canonical_json
@@ -58,14 +60,16 @@ class Jobs:
         submitted_by: str,
         idempotency_key: str | None = None,
         request_id: str | None = None,
+        accepted: Accepted | None = None,
     ) -> tuple[JobRecord, bool]:
         """Queues a job.
 
         Args:
-            spec: What to do.
+            spec: What to do, as it was asked for.
             submitted_by: Id of the key.
             idempotency_key: Names the request, so that it can be repeated until an answer arrives.
             request_id: Of the request.
+            accepted: What was decided of it; None: nothing had to be.
 
         Returns:
             The job, and whether it is new: False if the same request came before.
@@ -73,7 +77,7 @@ class Jobs:
         Raises:
             Problem: The idempotency key came with another job before.
         """
-        digest = hashlib.sha256(canonical_json(spec.model_dump(mode="json")).encode()).hexdigest()
+        digest, decided = _digest(spec), accepted or Accepted(spec)
         job_id = f"job_{uuid.uuid4().hex[:24]}"
 
         def body(connection: sa.Connection) -> tuple[str, bool]:
@@ -84,14 +88,15 @@ class Jobs:
                 "id": job_id,
                 "kind": spec.kind,
                 "name": spec.name,
-                "spec": spec.model_dump(mode="json"),
+                "spec": decided.spec.model_dump(mode="json"),
             }
             values |= {"state": "queued", "attempt": 1, "priority": spec.priority, "created": time.time()}
             values |= {"submitted_by": submitted_by, "request_id": request_id, "last_event": 0, "skipped": {}}
             values |= {"idempotency_key": idempotency_key}
             values |= {"idempotency_digest": None if idempotency_key is None else digest}
             connection.execute(tables.jobs.insert().values(**values))
-            events.add(connection, job_id, ("state", {"state": "queued", "attempt": 1}))
+            notes: list[Event] = [("log", {"text": note}) for note in decided.notes]
+            events.add(connection, job_id, ("state", {"state": "queued", "attempt": 1}), *notes)
             self._enqueue(connection, job_id, 1, spec)
             return job_id, True
 
@@ -109,6 +114,16 @@ class Jobs:
                     found, new = job_id, True
                     break
         return self.get(found), new
+
+    def repeated(self, spec: JobSpec, *, submitted_by: str, idempotency_key: str | None) -> JobRecord | None:
+        """The job of a request that came before; see `submit`.
+
+        Raises:
+            Problem: The idempotency key came with another job before.
+        """
+        with self._database.read() as connection:
+            earlier = _of_key(connection, submitted_by, idempotency_key)
+        return None if earlier is None else self.get(_same(earlier, _digest(spec)))
 
     def get(self, job_id: str) -> JobRecord:
         """A job.
@@ -343,6 +358,17 @@ class Jobs:
 
 
 _SELECT = sa.select(tables.jobs)
+
+
+_LATER_FIELDS = {"replay": True, "patience": 0}
+"""Fields that specs did not have from the beginning, with their defaults: a request from before is still the same."""
+
+
+def _digest(spec: JobSpec) -> str:
+    """What tells whether two requests are the same."""
+    told = spec.model_dump(mode="json")
+    old = {name: value for name, value in told.items() if name not in _LATER_FIELDS or value != _LATER_FIELDS[name]}
+    return hashlib.sha256(canonical_json(old).encode()).hexdigest()
 
 
 def _of_key(connection: sa.Connection, submitted_by: str, key: str | None) -> sa.Row[Any] | None:

@@ -276,6 +276,10 @@ class Registry:
             for name, numbers in sorted(published.items())
         ]
 
+    def made_from(self, publication: Publication) -> tuple[str, ...]:
+        """The artifacts that a version was made from, as `stage/key`; none if it was published as mere files."""
+        return tuple(self._row(publication).artifacts)
+
     def manifest(self, publication: Publication) -> Manifest:
         """The manifest of a version.
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from renderer.frame import Frame
 from renderer.techniques import Budget, KBuffer, KBufferDeep, KBufferImportance, KBufferOptimal
 from schemas.measurement import Measurement
+from services.stages.allocations import read_allocation
 from services.stages.desk import Desk, save_facts
-from services.stages.label import optimal
 from services.stages.shots import Session, Shot
 from services.tasks import Report, Task
 
@@ -41,7 +41,7 @@ def _baseline(session: Session, shots: list[Shot], report: Report) -> list[Measu
 
         def oracle(frame: Frame, _: Budget, fragments: int = shot.fragments) -> NDArray[np.int32]:
             full_size = frame is session.frame
-            return optimal(labels, fragments) if full_size else np.ones(frame.pixels, np.int32)
+            return read_allocation(labels, "optimal", fragments) if full_size else np.ones(frame.pixels, np.int32)
 
         measured += [shot.take(technique) for technique in (KBuffer(), KBufferImportance(), KBufferOptimal(oracle))]
         report(number / len(shots), f"{number} of {len(shots)} budgets")

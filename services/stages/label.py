@@ -6,37 +6,24 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-from safetensors.numpy import load_file, save_file
-
 from labeller.allocation import RULES, Allocation
 from labeller.curves import error_curves
+from labeller.flip_weights import flip_weights
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
 from labeller.shards import write_shard
 from labeller.skips import budget_skips, needed_budgets, pixel_skips
 from renderer.dump import read_dump
+from schemas.pixel_weights import DEFAULT_WEIGHTS
+from services.stages.allocations import write_allocations
 from services.stages.desk import SHARD, Desk, save_facts
 from services.tasks import Report, Task
 
 Answer = TypeVar("Answer")
 
-_OPTIMAL = "optimal.safetensors"
-
-
-def optimal(folder: Path, fragments: int) -> NDArray[np.int32]:
-    """int32 [P], the certified optimal allocation of a budget below N.
-
-    Args:
-        folder: The label artifact.
-        fragments: F, one of the budgets it was made for.
-    """
-    return np.asarray(load_file(folder / _OPTIMAL)[str(fragments)], dtype=np.int32)
-
 
 def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
-    """Writes the optimal allocations, the shard, and the errors of all rules."""
+    """Writes the allocations and the shard, and the errors of all rules."""
     params = task.params
     dump = read_dump(desk.artifact(task, "render"))
     curves = error_curves(dump, params["tail"], params["g"], params["metric"])
@@ -44,13 +31,15 @@ def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
     report(0.3, f"curves of {dump.total:,} fragments")
     budgets = needed_budgets(params["budgets"], dump.total)
     made = {rule: allocate_curves(dump, curves, budgets, rule, hulls=hulls) for rule in RULES}
-    # k rarely exceeds 255, never 65535 at any budget that is not exact; 16 bits halve the artifact.
-    save_file(
-        {str(a.budget): np.minimum(a.k, 65535).astype(np.uint16) for a in made["optimal"]} or _NOTHING,
-        folder / _OPTIMAL,
-    )
+    write_allocations(folder, made)
     report(0.8, f"{len(RULES)} rules at {len(budgets)} budgets")
-    written = write_shard(folder / SHARD, dump, curves, hulls, budgets, seed=params["seed"])
+    weights = params.get("weights", DEFAULT_WEIGHTS)
+    if weights == "flip":
+        # What is compared with other rules is not weighted; what is learned is.
+        counted = flip_weights(dump, [found.k for found in made["optimal"]], params["tail"], params["g"])
+        curves = error_curves(dump, params["tail"], params["g"], params["metric"], counted)
+    taught = hulls if weights == DEFAULT_WEIGHTS else lower_hulls(curves, 1)
+    written = write_shard(folder / SHARD, dump, curves, taught, budgets, seed=params["seed"], weights=weights)
     facts = {
         "errors": {rule: _answers(params["budgets"], allocations, _error, 0.0) for rule, allocations in made.items()},
         "certificates": _answers(params["budgets"], made["optimal"], _certificate, _EXACT),
@@ -59,9 +48,6 @@ def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
     }
     save_facts(folder, facts)
 
-
-_NOTHING = {"none": np.zeros(1, dtype=np.uint16)}
-"""A safetensors file must hold something."""
 
 _EXACT = {"error": 0.0, "bound": 0.0, "gap": 0.0}
 """The certificate of a budget that holds all fragments."""

@@ -1,8 +1,9 @@
-"""Pictures of an evaluation on disk: 8-bit PNGs, read back for the report."""
+"""Pictures of an evaluation on disk: PNGs as displayed, maps as PNGs, read back for the report and the pages."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +22,14 @@ def stem(technique: str, budget_factor: float) -> str:
     return f"{technique}-{budget_factor:g}"
 
 
-def write_png(path: Path, pixels: NDArray[np.uint8]) -> None:
-    """Write uint8 [H, W] or [H, W, 3]."""
+def write_png(path: Path, pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> None:
+    """Write uint8 [H, W] or [H, W, 3], or uint16 [H, W]."""
     Image.fromarray(pixels).save(path, compress_level=_FAST)
 
 
-def read_png(path: Path) -> NDArray[np.uint8]:
-    """Read what `write_png` wrote."""
-    with Image.open(path) as image:
+def read_png(file: Path | BinaryIO) -> NDArray[Any]:
+    """Read what `write_png` wrote, in its type."""
+    with Image.open(file) as image:
         return np.asarray(image)
 
 
@@ -36,3 +37,10 @@ def quantise_map(values: NDArray[np.floating]) -> NDArray[np.uint8]:
     """A map in [0,1] in 8 bits, for heat maps."""
     steps: NDArray[np.uint8] = np.floor(np.clip(values, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
     return steps
+
+
+def counts_map(k: NDArray[np.integer]) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """Counts in as few bits as hold them exactly: 8, or 16 (where a count above 65535 is taken as that)."""
+    if k.max(initial=0) <= 255:
+        return np.asarray(k, dtype=np.uint8)
+    return np.asarray(np.minimum(k, 65_535), dtype=np.uint16)

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from labeller.curves import composite
 from renderer import metrics
 from renderer.dump import read_dump
+from renderer.exr import write_exr
+from renderer.exr_header import Attribute
 from renderer.frame import Frame
 from renderer.techniques import Budget, Rendered, SBuffer, Technique
 from schemas.colour import display8
@@ -21,7 +23,7 @@ from schemas.measurement import Measurement
 from schemas.problem import ExitCode, Problem
 from schemas.view import View
 from services.stages.desk import Desk
-from services.stages.pictures import EXACT, quantise_map, stem, write_png
+from services.stages.pictures import EXACT, counts_map, quantise_map, stem, write_png
 from services.tasks import Task
 
 AGREEMENT = 1
@@ -53,14 +55,19 @@ class Session:
         return read_dump(self.desk.artifact(self.task, "render"))
 
     @cached_property
-    def exact(self) -> NDArray[np.uint8]:
-        """The reference picture, uint8 [H, W, 3]: all fragments composited on the CPU in float64."""
+    def exact_linear(self) -> NDArray[np.float32]:
+        """The reference picture, linear float32 [H, W, 3]: all fragments composited on the CPU in float64."""
         return self.simulate(self.dump.counts.astype(np.int32))
 
-    def simulate(self, k: NDArray[np.int32]) -> NDArray[np.uint8]:
-        """The CPU's picture of an allocation, uint8 [H, W, 3]."""
+    @cached_property
+    def exact(self) -> NDArray[np.uint8]:
+        """The same as displayed, uint8 [H, W, 3]."""
+        return display8(self.exact_linear)
+
+    def simulate(self, k: NDArray[np.int32]) -> NDArray[np.float32]:
+        """The CPU's picture of an allocation, linear float32 [H, W, 3]."""
         width, height = self.task.params["size"]
-        return display8(composite(self.dump, k, self.tail, self.g).reshape(height, width, 3))
+        return composite(self.dump, k, self.tail, self.g).reshape(height, width, 3)
 
     def render(self, technique: Technique, budget: Budget) -> Rendered:
         """A technique's picture; drivers compile shaders at their first use, so that is not the one measured."""
@@ -112,13 +119,13 @@ class Shot:
 
     def _measure(self, name: str, rendered: Rendered, exact: bool) -> Measurement:
         image, reference = display8(rendered.linear), self.session.exact
-        difference = _largest_difference(image, self.session.simulate(rendered.k))
+        difference = _largest_difference(image, display8(self.session.simulate(rendered.k)))
         self._require_agreement(name, difference)
         error = metrics.mse(image, reference)
         occupied = self.session.dump.counts > 0
         shape = (-1, 3)
         flip, error_map = metrics.flip(image, reference)
-        self._keep(name, image, error_map, rendered.k)
+        self._keep(name, rendered, image, error_map)
         return self._record(
             name,
             exact=exact,
@@ -138,13 +145,18 @@ class Shot:
             cpu_difference=difference,
         )
 
-    def _keep(self, name: str, image: NDArray[np.uint8], error_map: NDArray[np.float32], k: NDArray[np.int32]) -> None:
+    def _keep(self, name: str, rendered: Rendered, image: NDArray[np.uint8], error_map: NDArray[np.float32]) -> None:
         base, exact = stem(name, self.factor), self.folder / EXACT
+        about: dict[str, Attribute] = {"software": "diaphane", "tail": self.session.tail, "g": self.session.g}
         write_png(self.folder / f"{base}.png", image)
+        write_exr(
+            self.folder / f"{base}.exr", rendered.linear, {**about, "technique": name, "budget": str(self.fragments)}
+        )
         write_png(self.folder / f"{base}.flip.png", quantise_map(error_map))
-        write_png(self.folder / f"{base}.k.png", np.minimum(k, 255).astype(np.uint8).reshape(image.shape[:2]))
+        write_png(self.folder / f"{base}.k.png", counts_map(rendered.k).reshape(image.shape[:2]))
         if not exact.exists():
             write_png(exact, self.session.exact)
+            write_exr(exact.with_suffix(".exr"), self.session.exact_linear, {**about, "technique": "exact"})
 
     def _require_agreement(self, name: str, difference: int) -> None:
         if difference > AGREEMENT:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
+from schemas.pixel_weights import DEFAULT_WEIGHTS
 from schemas.tail import MetricName
 from schemas.view import View
 from services.plan import Plan, PlannedScene
@@ -15,6 +17,8 @@ from services.versions import code_version
 METRIC: MetricName = "display"
 
 EvaluationKind = Literal["baseline", "bundle"]
+
+_REPLAYED = ":replayed"
 
 _SOURCES: Mapping[StageName, tuple[str, ...]] = {
     "scene": (
@@ -31,8 +35,8 @@ _SOURCES: Mapping[StageName, tuple[str, ...]] = {
     ),
     "label": (
         *("labeller", "renderer.allocation", "renderer.features", "renderer.depth_bins", "renderer.dump"),
-        *("schemas.tail", "schemas.colour", "schemas.skips"),
-        "services.stages.label",
+        *("schemas.tail", "schemas.colour", "schemas.skips", "schemas.pixel_weights", "renderer.metrics"),
+        *("services.stages.label", "services.stages.allocations"),
     ),
     "train": (
         *(f"trainer.{name}" for name in ("adam", "checkpoint", "config", "dataset", "evaluate", "heads", "loss")),
@@ -53,6 +57,8 @@ _SOURCES: Mapping[StageName, tuple[str, ...]] = {
             for name in (
                 "allocation",
                 "depth_bins",
+                "exr",
+                "exr_header",
                 "features",
                 "metrics",
                 "onnx_network",
@@ -121,7 +127,7 @@ def label_task(plan: Plan, view: RenderedView) -> Task:
         stage="label",
         version=version_of("label"),
         inputs=(view.task.address.key,),
-        params={**_allocation(plan), "metric": METRIC, "seed": plan.seed},
+        params={**_allocation(plan), "metric": METRIC, "seed": plan.seed, **_weights(plan)},
         needs=(view.task.artifact,),
     )
 
@@ -139,6 +145,8 @@ def train_task(
         config: Further settings of the trainer.
     """
     params: dict[str, Any] = {"seed": plan.seed, "steps": plan.steps, "network": plan.network, **(config or {})}
+    inputs = [f"{digest}:{artifact.partition('/')[2]}" for digest, artifact in shards]
+    inputs += [f"{digest}:{artifact.partition('/')[2]}{_REPLAYED}" for digest, artifact in plan.replayed]
     if plan.patience:
         params["patience"] = plan.patience
     if start is not None:
@@ -149,12 +157,40 @@ def train_task(
         name=plan.name,
         stage="train",
         version=version_of("train"),
-        inputs=tuple(f"{digest}:{artifact.partition('/')[2]}" for digest, artifact in shards),
+        inputs=tuple(inputs),
         params=params,
-        needs=tuple(artifact for _, artifact in shards),
+        needs=tuple(artifact for _, artifact in (*shards, *plan.replayed)),
         bundle=start,
         replay=plan.replay,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class TrainedOn:
+    """A shard that a training read.
+
+    Attributes:
+        scene: Digest of its scene.
+        artifact: Its labels, `label/key`.
+        replayed: Whether it is one that the network had learned before.
+    """
+
+    scene: str
+    artifact: str
+    replayed: bool
+
+
+def trained_on(inputs: Sequence[str]) -> list[TrainedOn]:
+    """The shards of a training, in the order of its needs.
+
+    Args:
+        inputs: Of its address.
+    """
+    found = []
+    for text in inputs:
+        scene, _, key = text.removesuffix(_REPLAYED).partition(":")
+        found.append(TrainedOn(scene, f"label/{key}", text.endswith(_REPLAYED)))
+    return found
 
 
 def export_task(plan: Plan, train: Task, scenes: Mapping[str, str], held_out: Mapping[str, str]) -> Task:
@@ -216,6 +252,15 @@ def evaluate_task(
     )
 
 
+def evaluated_from(inputs: Sequence[str]) -> tuple[str, str]:
+    """The artifacts (`stage/key`) of fragments and of labels that an evaluation was made from.
+
+    Args:
+        inputs: Of its address.
+    """
+    return f"render/{inputs[0]}", f"label/{inputs[1]}"
+
+
 def report_task(name: str, data: Mapping[str, Any], evaluations: Sequence[tuple[str, Task]]) -> Task:
     """Writes the HTML report.
 
@@ -236,6 +281,10 @@ def report_task(name: str, data: Mapping[str, Any], evaluations: Sequence[tuple[
 
 def _picture(plan: Plan, view: View) -> dict[str, Any]:
     return {"view": view.model_dump(mode="json"), "size": [plan.width, plan.height], "alpha": plan.alpha}
+
+
+def _weights(plan: Plan) -> dict[str, Any]:
+    return {"weights": plan.weights} if plan.weights != DEFAULT_WEIGHTS else {}
 
 
 def _allocation(plan: Plan) -> dict[str, Any]:

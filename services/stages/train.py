@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from schemas.bundle import WEIGHTS
 from schemas.measurement import TrainingPoint
 from services.report.live import write_live
 from services.stages.desk import SHARD, Desk, save_facts
+from services.stages.tasks import TrainedOn, trained_on
 from services.tasks import Report, Source, Task
 from trainer.bundle import load_bundle
 from trainer.log import read_log
@@ -34,9 +36,11 @@ def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
     """
     start = None if task.bundle is None else load_bundle(desk.bundle(task)).weights
     config = _config(task, start)
-    shards = [desk.store.fetch(need) / SHARD for need in task.needs]
-    views = open_views(shards, [asset.partition(":")[0] for asset in task.inputs])
-    replay = [] if task.replay is None else _replayed(task.replay)
+    shards = trained_on(task.inputs)
+    views = _opened(desk, [shard for shard in shards if not shard.replayed])
+    replay = _opened(desk, [shard for shard in shards if shard.replayed])
+    if task.replay is not None:
+        replay += _replayed(task.replay)
     checkpoint = desk.checkpoint(task)
     log, page = checkpoint.with_suffix(".jsonl"), checkpoint.with_name(f"{task.name}.html")
 
@@ -70,6 +74,13 @@ def _config(task: Task, start: Weights | None) -> TrainConfig:
         return config
     own = {"features": start.features, "hidden": start.hidden}
     return config.model_copy(update={**own, "lr": FINE_TUNING * config.lr})
+
+
+def _opened(desk: Desk, shards: Sequence[TrainedOn]) -> list[ShardView]:
+    """The views of label artifacts, assets named by the content of their scenes."""
+    if not shards:
+        return []
+    return open_views([desk.store.fetch(s.artifact) / SHARD for s in shards], [s.scene for s in shards])
 
 
 def _replayed(source: Source) -> list[ShardView]:

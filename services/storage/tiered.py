@@ -107,6 +107,18 @@ class TieredStore(Store):
         self._remote.touch(_used_name(artifact), modified)
         return content
 
+    def made_from(self, artifact: str) -> Address:
+        """What an artifact was made from.
+
+        Raises:
+            MissingArtifact: It is absent, or its meta.json is damaged.
+            Problem: The object store cannot be reached.
+        """
+        with suppress(MissingArtifact):
+            return super().made_from(artifact)
+        meta, _ = self._remote_meta(artifact)
+        return Address(meta["stage"], meta["version"], meta["inputs"], meta["params"])
+
     def push(self, address: Address) -> None:
         """Sends an artifact of the cache to the object store, unless it is there.
 

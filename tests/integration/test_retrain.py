@@ -157,6 +157,29 @@ def test_a_failed_job_goes_on_when_the_run_is_repeated(server: FakeServer) -> No
     assert job["attempt"] == 2
 
 
+def test_the_network_to_begin_with_is_looked_up_before_anything_is_sent(
+    server: FakeServer, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run([*COMMAND, "--from", "glass@best"]) == ExitCode.NOT_FOUND
+    assert not [asked for asked in server.asked if asked.method != "GET"]
+    better(server)
+    assert run([*COMMAND, "--from", "glass@champion", "--no-replay", "--patience", "2"]) == ExitCode.OK
+    (job,) = server.jobs.values()
+    spec = job["spec"]
+    assert (spec["start_from"], spec["replay"], spec["patience"]) == ("glass@1.0.0", False, 2)
+
+
+def test_a_promoted_version_s_own_job_is_found_by_what_it_began_with(server: FakeServer) -> None:
+    better(server)
+    assert run([*COMMAND, "--promote"]) == ExitCode.OK
+    (job,) = server.jobs.values()
+    job["spec"]["start_from"] = "glass@1.0.0"  # as a server answers that has decided what the alias means
+    assert run([*COMMAND, "--promote"]) == ExitCode.OK
+    assert len(server.jobs) == 1
+    assert run([*COMMAND, "--from", "glass@1.1.0"]) == ExitCode.OK
+    assert len(server.jobs) == 2, "the same scenes on another beginning are another job"
+
+
 def test_a_better_version_is_promoted_if_asked_and_a_repeated_run_finds_it(
     server: FakeServer, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -254,7 +277,7 @@ def test_quarantined_views_are_named_in_the_table(server: FakeServer, capsys: py
         (["--max-regression", "-1"], "--max-regression -1.0 is not a fraction"),
         (["--max-regression", "nan"], "is not a fraction"),
         (["--baseline", "glass@1.0.0"], "--baseline 'glass@1.0.0' is not known"),
-        (["--start-from", "zero"], "--start-from 'zero' is not known"),
+        (["--patience", "-1"], "patience"),
         (["--budgets", "0"], "budgets.0"),
         (["--size", "big"], "is not a size"),
         (["--holdout", "cups.usdz", "--holdout", "leaves.usdz"], "every scene is held out"),
@@ -290,6 +313,7 @@ def script(folder: Path, server: FakeServer, **variables: str) -> subprocess.Com
 def test_the_script_passes_and_writes_where_a_workflow_looks(server: FakeServer, folder: Path) -> None:
     better(server)
     options = {"RETRAIN_BUDGETS": "1,2", "RETRAIN_SIZE": "64x48", "RETRAIN_STEPS": "9", "RETRAIN_PROMOTE": "true"}
+    options |= {"RETRAIN_START_FROM": "scratch", "RETRAIN_REPLAY": "false", "RETRAIN_PATIENCE": "2"}
     pages = {"GITHUB_STEP_SUMMARY": "page.md", "GITHUB_OUTPUT": "outputs", "RETRAIN_SUMMARY": "table.md"}
     done = script(folder, server, **options, **pages)
     assert done.returncode == ExitCode.OK, done.stderr
@@ -299,6 +323,7 @@ def test_the_script_passes_and_writes_where_a_workflow_looks(server: FakeServer,
     assert server.alias("glass", "champion") == "1.1.0"
     spec = server.jobs[job_id]["spec"]
     assert (spec["budgets"], spec["width"], spec["height"], spec["steps"]) == ([1.0, 2.0], 64, 48, 9)
+    assert (spec["start_from"], spec["replay"], spec["patience"]) == ("scratch", False, 2)
     assert [use["holdout"] for use in spec["scenes"]] == [True, False, False, True]
     assert KEY not in done.stdout + done.stderr
 
@@ -334,6 +359,7 @@ def test_nothing_that_the_script_is_given_becomes_shell_code(server: FakeServer,
         ({"RETRAIN_SCENES": ""}, "set RETRAIN_SCENES"),
         ({"RETRAIN_HOLDOUT": ""}, "set RETRAIN_HOLDOUT"),
         ({"RETRAIN_PROMOTE": "yes"}, "use true or false"),
+        ({"RETRAIN_REPLAY": "no"}, "use true or false"),
     ],
 )
 def test_the_script_says_what_is_missing(

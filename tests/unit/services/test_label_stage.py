@@ -7,15 +7,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from safetensors.numpy import load_file
+import zarr
 from support.dumps import random_dump
 
 from labeller.allocation import RULES
 from labeller.curves import error_curves
+from labeller.flip_weights import flip_weights
 from labeller.rules import allocate_curves
 from labeller.shards import read_shard
 from renderer.dump import write_dump
+from schemas.problem import Problem
 from services.stages import label
+from services.stages.allocations import pixel_allocations, read_allocation
 from services.stages.desk import SHARD, load_facts
 from services.tasks import Facts, Task
 
@@ -26,9 +29,13 @@ BUDGETS = [N // 2, 2 * N, N // 4, N // 2, N]
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return _made(tmp_path_factory)
+
+
+def _made(tmp_path_factory: pytest.TempPathFactory, **more: str) -> Path:
     rendered, made = tmp_path_factory.mktemp("render"), tmp_path_factory.mktemp("label")
     write_dump(rendered, DUMP)
-    params = {"budgets": BUDGETS, "tail": "density", "g": 0.75, "metric": "display", "seed": 3}
+    params = {"budgets": BUDGETS, "tail": "density", "g": 0.75, "metric": "display", "seed": 3, **more}
     task = Task(name="box front", stage="label", version="0", params=params)
     desk = SimpleNamespace(artifact=lambda task, stage: rendered)
     label.make(desk, task, made, lambda fraction, note: None)  # type: ignore[arg-type]
@@ -52,9 +59,15 @@ def test_every_budget_has_an_answer_in_the_order_asked(facts: Facts) -> None:
 
 
 def test_a_budget_is_allocated_once_and_one_that_holds_everything_never(folder: Path) -> None:
-    kept = load_file(folder / "optimal.safetensors")
-    assert set(kept) == {str(N // 2), str(N // 4)}
-    assert label.optimal(folder, N // 2).sum() <= N // 2
+    kept = zarr.open_group(folder / "allocations.zarr", mode="r")
+    assert kept.attrs["budgets"] == [N // 4, N // 2]
+    for rule in RULES:
+        for budget in (N // 2, N // 4):
+            (made,) = allocate_curves(DUMP, error_curves(DUMP, "density"), [budget], rule)
+            assert read_allocation(folder, rule, budget).tolist() == made.k.tolist()
+            assert pixel_allocations(folder, budget, 37)[rule] == made.k[37]
+    with pytest.raises(Problem, match="has no allocations"):
+        read_allocation(folder, "optimal", N)
 
 
 def test_what_took_no_part_is_counted(facts: Facts, folder: Path) -> None:
@@ -73,3 +86,19 @@ def test_the_shard_is_the_one_that_the_facts_name(facts: Facts, folder: Path) ->
     assert facts["shard"]["bytes"] == shard.stat().st_size
     assert read_shard(shard).meta.sampling.seed == 3
     assert [level.budget for level in read_shard(shard).meta.levels if level.scored] == [N // 4, N // 2]
+
+
+def test_weights_are_in_the_rows_alone(facts: Facts, folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    other = _made(tmp_path_factory, weights="flip")
+    assert load_facts(other)["errors"] == load_facts(folder)["errors"]
+    assert load_facts(other)["certificates"] == load_facts(folder)["certificates"]
+    plain, weighted = read_shard(folder / SHARD), read_shard(other / SHARD)
+    assert (plain.meta.weights, weighted.meta.weights) == ("none", "flip")
+    assert np.array_equal(plain.pixel, weighted.pixel)
+    usual = error_curves(DUMP, "density")
+    kept = [found.k for found in allocate_curves(DUMP, usual, [N // 4, N // 2], "optimal")]
+    counted = flip_weights(DUMP, kept, "density")
+    first = weighted.hull_offsets[:-1][np.diff(weighted.hull_offsets) > 0]
+    pixel = weighted.pixel[np.diff(weighted.hull_offsets) > 0]
+    at_least = usual.at(np.minimum(DUMP.counts, 1))[pixel]
+    np.testing.assert_allclose(weighted.hull_error[first], counted[pixel] * at_least, rtol=1e-5)

@@ -9,7 +9,15 @@ from typing import Any
 import pytest
 
 from schemas.problem import ExitCode, Problem
-from services.options import BuildOptions, check_budget, default_holdout, parse_budgets, parse_size, parse_tail
+from services.options import (
+    BuildOptions,
+    check_budget,
+    default_holdout,
+    parse_budgets,
+    parse_size,
+    parse_tail,
+    parse_weights,
+)
 
 
 @pytest.fixture
@@ -130,6 +138,7 @@ def test_texts_are_parsed__yes() -> None:
     assert parse_budgets("1,2.5, 4") == (1.0, 2.5, 4.0)
     assert parse_size("1430x960") == (1430, 960)
     assert parse_tail("paper") == "paper"
+    assert parse_weights("flip") == "flip"
 
 
 @pytest.mark.parametrize("text", ["", "1430", "1430x", "x960", "1430 x 960x2", "-1x2", "1.5x2"])
@@ -143,3 +152,5 @@ def test_other_texts_are_parsed__no() -> None:
         parse_budgets("1;2")
     with pytest.raises(Problem, match="no tail 'dense'"):
         parse_tail("dense")
+    with pytest.raises(Problem, match="no weights 'ssim'"):
+        parse_weights("ssim")

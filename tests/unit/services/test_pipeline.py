@@ -11,7 +11,9 @@ from support.runner import TableRunner, scene
 from schemas.job import JobSpec
 from schemas.problem import Problem
 from services import pipeline
+from services.engine.progress import SHARES
 from services.pipeline import JobContext, run_job
+from services.tasks import STAGE_NEEDS, STAGE_ROLE, Task
 
 SCENES = {record.id: record for record in (scene(1, "bottles"), scene(2, "knots"), scene(3, "town"))}
 JOB = JobContext(id="job_0", created="2026-01-01T00:00:00+00:00")
@@ -40,6 +42,18 @@ def test_a_build_goes_through_every_stage_once_and_publishes_what_it_measured() 
     assert published["job_id"] == "job_0"
     assert published["artifacts"][0] == runner.of("export")[0].artifact
     assert {need.partition("/")[0] for need in published["artifacts"][1:]} == {"train", "label"}
+
+
+def test_stages_come_after_what_their_tasks_need() -> None:
+    runner = TableRunner()
+    run(runner, spec())
+    assert list(STAGE_NEEDS) == runner.stages() == list(STAGE_ROLE) == list(SHARES["build"])
+    needed = {(task.stage, need.partition("/")[0]) for task in runner.asked for need in task.needs}
+    direct = {(stage, before) for stage in STAGE_NEEDS for before in STAGE_NEEDS[stage]}
+    # Views of a scene are facts that a capture is asked for with, and no artifact that it reads.
+    assert direct - {("render", "scene")} <= needed
+    with pytest.raises(ValueError, match="the stage label does not come after train"):
+        Task(name="early", stage="label", version="1", needs=("train/" + "0" * 64,))
 
 
 def test_held_out_views_are_not_trained_on() -> None:

@@ -88,7 +88,7 @@ def test_a_held_out_scene_that_was_learned_is_refused(plan: Plan, options: Build
         fine_tuning(known, options, NO_REGISTRY, Heard())
 
 
-@pytest.mark.parametrize("change", [{"tail": "exact-coverage"}, {"g": 0.5}, {"seed": 1}])
+@pytest.mark.parametrize("change", [{"tail": "exact-coverage"}, {"g": 0.5}, {"seed": 1}, {"weights": "flip"}])
 def test_labels_of_another_kind_are_refused(change: dict[str, Any], plan: Plan, options: BuildOptions) -> None:
     with pytest.raises(Problem, match="labelled otherwise") as caught:
         fine_tuning(replace(plan, **change), options, NO_REGISTRY, Heard())

@@ -68,6 +68,22 @@ def test_a_single_file_is_read_and_verified(machine: Machine) -> None:
         two.read(ARTIFACT, "other.json")
 
 
+def test_what_an_artifact_was_made_from_is_known_without_fetching_it(machine: Machine) -> None:
+    one, two = machine("one").store, machine("two").store
+    with pytest.raises(MissingArtifact):
+        two.made_from(ARTIFACT)
+    make(one)
+    one.push(ADDRESS)
+    found = two.made_from(ARTIFACT)
+    assert (found.artifact, list(found.inputs), found.params) == (ARTIFACT, ["a", "b"], ADDRESS.params)
+    (one.path(ADDRESS) / META).write_text("{}")
+    if isinstance(one, TieredStore):
+        assert one.made_from(ARTIFACT).key == ADDRESS.key
+    else:
+        with pytest.raises(MissingArtifact):
+            one.made_from(ARTIFACT)
+
+
 def test_a_removed_artifact_is_gone_for_all(machine: Machine) -> None:
     one, two = machine("one").store, machine("two").store
     make(one)

@@ -131,3 +131,12 @@ def test_a_history_of_one_version_makes_no_chart() -> None:
     assert charts.history_chart({"a": [1e-4]}, ["1.0.0"], set(), "errors") == ""
     assert charts.history_chart({"a": [1e-4, None]}, ["1.0.0", "1.1.0"], set(), "errors") == ""
     assert charts.history_chart({}, [], set(), "errors") == ""
+
+
+def test_a_curve_shows_its_hull_and_who_chose_what() -> None:
+    svg = charts.curve_chart([4e-5, 1e-5, 3e-5, 0.0], [1, 3], {1: ["A", "VKB <x>"], 2: ["B"]}, "a pixel")
+    assert svg.count("<polyline") == 2
+    assert 'class="front"' in svg
+    assert "k = 1, 1.00e-5: A, VKB &lt;x&gt;" in svg
+    assert svg.count('class="mark"') == 2
+    assert charts.curve_chart([0.0, 0.0], [], {}, "exact") == ""
