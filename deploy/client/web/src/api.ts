@@ -1,0 +1,50 @@
+// Written by scripts/api-types.mjs of docs/openapi.json: `npm run types`.
+
+/** A page of names in the registry. */
+export interface ModelPage {
+  readonly items: readonly (ModelRecord)[];
+}
+
+/** `application/problem+json` (RFC 9457). */
+export interface ProblemDocument {
+  readonly detail?: string;
+  readonly errors?: readonly (Readonly<Record<string, unknown>>)[];
+  readonly instance?: string;
+  readonly remedy?: string;
+  readonly request_id?: string;
+  readonly status: number;
+  readonly title: string;
+  readonly type: string;
+}
+
+/** A published version. */
+export interface VersionRecord {
+  readonly aliases?: readonly (string)[];
+  readonly created: string;
+  readonly digest: string;
+  readonly evaluation: Readonly<Record<string, unknown>>;
+  readonly files: Readonly<Record<string, FileRef>>;
+  readonly job_id?: string | null;
+  readonly name: string;
+  readonly parity: Readonly<Record<string, unknown>>;
+  readonly provenance: Readonly<Record<string, unknown>>;
+  readonly public_key: string;
+  readonly score: number | null;
+  readonly signature: string;
+  readonly statement: string;
+  readonly version: string;
+}
+
+/** A name in the registry. */
+export interface ModelRecord {
+  readonly aliases: Readonly<Record<string, string>>;
+  readonly latest: string;
+  readonly name: string;
+  readonly versions: number;
+}
+
+/** A file by content. */
+export interface FileRef {
+  readonly bytes: number;
+  readonly sha256: string;
+}

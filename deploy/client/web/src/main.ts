@@ -1,0 +1,206 @@
+// The demo: puts scene, model, techniques and controls together.
+
+import shells from "../samples/shells.glb?url";
+import shelf from "../samples/shelf.glb?url";
+import type { View } from "./camera";
+import { Gpu } from "./gpu";
+import { readGlb } from "./gltf";
+import { attach } from "./hands";
+import { at, fill, say, show } from "./page";
+import { selfTest } from "./passes/network";
+import type { Mode } from "./passes/screen";
+import { Registry, SignedOut } from "./registry";
+import { TECHNIQUES, type Technique } from "./renderer";
+import { Stage } from "./stage";
+import { Trouble } from "./trouble";
+
+const SAMPLES = { "glass shells": shells, "a shelf of bottles": shelf };
+const NAMES: Readonly<Record<Technique, string>> = {
+  "kbuffer-deep": "kbuffer-deep: predicted k",
+  kbuffer: "kbuffer: fixed k",
+  "weighted-blended": "weighted-blended",
+  sbuffer: "sbuffer: exact",
+};
+const LEGENDS: Readonly<Record<Mode, string>> = {
+  picture: "",
+  count: "0, 1, 3, 7, … to 63 fragments and more, by doubling",
+  error: "largest difference of red, green and blue: 0 to 32 of 255 and more",
+};
+
+const registry = new Registry(localStorage);
+const select = (id: string): HTMLSelectElement => at<HTMLSelectElement>(id);
+
+async function start(): Promise<void> {
+  const stage = new Stage(await Gpu.open(), at<HTMLCanvasElement>("canvas"), show, say);
+  stage.gpu.device.addEventListener("uncapturederror", (event) => say(event.error));
+  void stage.gpu.device.lost.then(() => {
+    const remedy = "Load the page again; if it stays so, update the browser and the graphics driver.";
+    say(new Trouble("The graphics device was lost.", remedy));
+  });
+  fill(
+    select("scene"),
+    Object.keys(SAMPLES).map((name) => [name, name]),
+  );
+  for (const side of ["left", "right"] as const) choose(stage, side, stage.wanted[side]);
+  listen(stage);
+  attach(at("stage"), stage, (by) => setSplit(stage, stage.wanted.split + by));
+  // For whoever wants numbers: a picture of the open scene at the canvas's size.
+  Object.assign(globalThis, {
+    diaphane: { picture: (view: View, technique: Technique, factor: number) => stage.picture(view, technique, factor) },
+  });
+  await Promise.all([openSample(stage), offerModels(stage)]);
+}
+
+function listen(stage: Stage): void {
+  const changed = (id: string, act: () => unknown): void =>
+    at(id).addEventListener(id === "budget" || id === "split" ? "input" : "change", () => void act());
+  changed("scene", () => openSample(stage));
+  changed("file", () => openFile(stage, at<HTMLInputElement>("file").files?.[0]));
+  changed("model", () => loadModel(stage));
+  changed("mode", () => setMode(stage));
+  changed("split", () => setSplit(stage, at<HTMLInputElement>("split").valueAsNumber / 100));
+  changed("budget", () => setBudget(stage));
+  for (const side of ["left", "right"] as const)
+    changed(side, () => choose(stage, side, select(side).value as Technique));
+  at("controls").addEventListener("submit", (event) => event.preventDefault());
+  at("forget").addEventListener("click", () => {
+    const [name, selector] = chosenModel();
+    if (name && selector) registry.forget(name, selector);
+    void loadModel(stage);
+  });
+  const element = at("stage");
+  const over = (event: DragEvent, is: boolean): void => {
+    event.preventDefault();
+    element.classList.toggle("over", is);
+  };
+  element.addEventListener("dragover", (event) => over(event, true));
+  element.addEventListener("dragleave", (event) => over(event, false));
+  element.addEventListener("drop", (event) => {
+    over(event, false);
+    void openFile(stage, event.dataTransfer?.files[0]);
+  });
+  new ResizeObserver(() => stage.draw()).observe(stage.canvas);
+  setBudget(stage);
+}
+
+/** Does something that takes a while, says so, and says what went wrong. */
+async function busy(text: string, work: () => Promise<void>): Promise<void> {
+  at("status").textContent = text;
+  try {
+    await work();
+    say(null);
+  } catch (error) {
+    say(error);
+  } finally {
+    at("status").textContent = "";
+  }
+}
+
+const openSample = (stage: Stage): Promise<void> =>
+  busy("The scene is loading.", async () => {
+    const name = select("scene").value as keyof typeof SAMPLES;
+    const answer = await fetch(SAMPLES[name]);
+    if (!answer.ok) throw new Trouble("The sample cannot be loaded.", "Load the page again.");
+    await stage.open(await readGlb(name, new Uint8Array(await answer.arrayBuffer())));
+  });
+
+async function openFile(stage: Stage, file: File | undefined): Promise<void> {
+  if (!file) return;
+  await busy("The file is read.", async () => {
+    await stage.open(await readGlb(file.name, new Uint8Array(await file.arrayBuffer())));
+    if (!Array.from(select("scene").options).some((option) => option.value === "")) {
+      select("scene").prepend(new Option("", ""));
+    }
+    select("scene").options[0]!.text = file.name;
+    select("scene").value = "";
+  });
+}
+
+function choose(stage: Stage, side: "left" | "right", technique: Technique): void {
+  const usable = TECHNIQUES.filter((each) => each !== "kbuffer-deep" || stage.bundle !== null);
+  fill(
+    select(side),
+    usable.map((each) => [each, NAMES[each]]),
+  );
+  stage.wanted[side] = usable.includes(technique) ? technique : "kbuffer";
+  select(side).value = stage.wanted[side];
+  at(`${side}-name`).textContent = stage.wanted[side];
+  stage.draw();
+}
+
+function setMode(stage: Stage): void {
+  const mode = select("mode").value as Mode;
+  stage.wanted.mode = mode;
+  at("legend").hidden = mode === "picture";
+  at("ramp").className = mode;
+  at("legend-text").textContent = LEGENDS[mode];
+  stage.draw();
+}
+
+function setSplit(stage: Stage, split: number): void {
+  stage.wanted.split = Math.min(Math.max(split, 0), 1);
+  at<HTMLInputElement>("split").valueAsNumber = Math.round(100 * stage.wanted.split);
+  stage.present();
+}
+
+function setBudget(stage: Stage): void {
+  stage.wanted.factor = 2 ** at<HTMLInputElement>("budget").valueAsNumber;
+  at("budget-value").textContent = `${stage.wanted.factor.toPrecision(3)} fragments a pixel`;
+  stage.draw();
+}
+
+const chosenModel = (): string[] => select("model").value.split("@");
+
+async function offerModels(stage: Stage): Promise<void> {
+  const note = at("model-note");
+  try {
+    const choices = await registry.choices();
+    if (choices.length === 0) {
+      note.textContent = "There is no model yet: build one, then load this page again. The other techniques need none.";
+      return;
+    }
+    const names = choices.map(({ name, selector, version }): [string, string] => {
+      const text = selector === version ? `${name} ${version}` : `${name}@${selector} (${version})`;
+      return [`${name}@${selector}`, text];
+    });
+    fill(select("model"), [["", "none"], ...names]);
+    select("model").disabled = false;
+    select("model").value = names[0]![0];
+    await loadModel(stage);
+    if (stage.bundle) choose(stage, "right", "kbuffer-deep");
+  } catch (error) {
+    note.textContent = error instanceof Error ? error.message : "";
+    if (!(error instanceof SignedOut)) return;
+    const link = document.createElement("a");
+    link.href = "/sign-in?next=%2Fdemo";
+    link.textContent = "Sign in";
+    note.replaceChildren(link, " to render with a published model. The other techniques need none.");
+  }
+}
+
+async function loadModel(stage: Stage): Promise<void> {
+  const [name, selector] = chosenModel();
+  const note = at("model-note");
+  note.textContent = "";
+  stage.bundle = null;
+  if (name && selector) {
+    await busy("The model is fetched.", async () => {
+      const bundle = await registry.pull(name, selector);
+      await selfTest(stage.gpu, bundle);
+      stage.bundle = bundle;
+      const signed = bundle.isSigned
+        ? "signature and hashes are right"
+        : "hashes are right; this browser cannot check the signature (it has no Ed25519), and trusts the server";
+      note.textContent = `${name} ${bundle.version}: ${signed}; its self-test passes on this device.`;
+    });
+  }
+  for (const side of ["left", "right"] as const) choose(stage, side, stage.wanted[side]);
+}
+
+start().catch((error: unknown) => {
+  say(error);
+  at("status").textContent = "There is nothing to see without WebGPU.";
+  for (const control of document.querySelectorAll<HTMLInputElement>("#controls input, #controls select")) {
+    control.disabled = true;
+  }
+});

@@ -1,0 +1,107 @@
+// One view of a scene: the opaque background, n(p) and the depth range, and the buffers that the techniques share.
+
+import { type Bounds, type View, cameraBlock } from "../camera";
+import { type Gpu, type Resource, groupsFor } from "../gpu";
+import { encodeGamma2 } from "../scene";
+import { shader } from "../shaders";
+import { BACKGROUND, DEPTH, type Geometry, type Pass } from "./geometry";
+
+const STATISTICS = 3;
+const COUNT: Pass = { files: ["count"], entryPoint: "count_fragments", writes: [true], targets: [] };
+
+export class Frame {
+  readonly pixels: number;
+  readonly background: GPUTexture;
+  readonly depth: GPUTexture;
+  /** n, ~ of the least depth's bits, the greatest depth's bits of every pixel. */
+  readonly statistics: GPUBuffer;
+  readonly #buffers = new Map<string, GPUBuffer>();
+  readonly #targets = new Map<string, GPUTexture>();
+
+  constructor(
+    readonly gpu: Gpu,
+    readonly geometry: Geometry,
+    readonly width: number,
+    readonly height: number,
+  ) {
+    this.pixels = width * height;
+    this.background = this.target("background", BACKGROUND);
+    this.depth = this.target("depth", DEPTH);
+    this.statistics = this.words("statistics", STATISTICS * this.pixels);
+  }
+
+  /** Gives back all buffers and textures. */
+  destroy(): void {
+    for (const each of [...this.#buffers.values(), ...this.#targets.values()]) each.destroy();
+  }
+
+  /** A storage buffer of words that is kept under a name; its content is what was left in it. */
+  words(name: string, count: number): GPUBuffer {
+    const before = this.#buffers.get(name);
+    if (before && before.size === 4 * Math.max(count, 1)) return before;
+    before?.destroy();
+    const made = this.gpu.words(count);
+    this.#buffers.set(name, made);
+    return made;
+  }
+
+  /** The same, perhaps with room for more; its first words are zero when the encoder's commands run. */
+  zeros(encoder: GPUCommandEncoder, name: string, count: number): GPUBuffer {
+    const buffer = this.room(name, count);
+    encoder.clearBuffer(buffer, 0, 4 * count);
+    return buffer;
+  }
+
+  /** A storage buffer with room for words: it grows, and stays where fewer are needed. */
+  room(name: string, count: number): GPUBuffer {
+    return this.words(name, Math.max(count, (this.#buffers.get(name)?.size ?? 0) / 4));
+  }
+
+  /** A texture of the frame's size that is kept under a name. */
+  target(name: string, format: GPUTextureFormat): GPUTexture {
+    let texture = this.#targets.get(name);
+    if (!texture) {
+      const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.TEXTURE_BINDING;
+      texture = this.gpu.device.createTexture({ size: [this.width, this.height], format, usage });
+      this.#targets.set(name, texture);
+    }
+    return texture;
+  }
+
+  /** Runs a compute shader for every pixel, 64 a group. */
+  forPixels(
+    encoder: GPUCommandEncoder,
+    files: readonly string[],
+    entryPoint: string,
+    resources: readonly Resource[],
+    { bins = 16, before = "", threads = this.pixels } = {},
+  ): void {
+    this.dispatch(encoder, shader(files, bins, before), entryPoint, resources, groupsFor(threads));
+  }
+
+  /** Runs a compute shader. */
+  dispatch(
+    encoder: GPUCommandEncoder,
+    code: string,
+    entryPoint: string,
+    resources: readonly Resource[],
+    groups: readonly [number, number],
+  ): void {
+    const pipeline = this.gpu.compute(code, entryPoint);
+    const pass = encoder.beginComputePass();
+    pass.setPipeline(pipeline);
+    pass.setBindGroup(0, this.gpu.bind(pipeline, resources));
+    pass.dispatchWorkgroups(...groups);
+    pass.end();
+  }
+
+  /** Draws the opaque surfaces and counts the transparent fragments of a view; the clear colour is linear grey. */
+  draw(encoder: GPUCommandEncoder, view: View, bounds: Bounds, clear: number): void {
+    const { geometry, width, height } = this;
+    geometry.look(cameraBlock(view, bounds, geometry.scene.up, width, height));
+    const grey = encodeGamma2(clear) / 255;
+    geometry.drawOpaque(encoder, this.background, this.depth, [grey, grey, grey, 1]);
+    encoder.clearBuffer(this.statistics);
+    geometry.drawTransparent(encoder, COUNT, 16, this.depth, [this.statistics]);
+  }
+}

@@ -1,0 +1,53 @@
+// A bundle's network, as its own WGSL: checked on the rows of its manifest, then run on what was gathered.
+
+import type { Bundle } from "../bundle";
+import type { Gpu } from "../gpu";
+import { shader } from "../shaders";
+import { Trouble } from "../trouble";
+import type { Allocation } from "./allocation";
+import type { Frame } from "./frame";
+import type { Sums } from "./sums";
+
+const FILES = ["state", "statistics", "depth_bins", "curves"];
+
+/** Predicts a and 1 / b of every pixel that has a choice, into the allocation's curves. */
+export function predict(frame: Frame, encoder: GPUCommandEncoder, bundle: Bundle, sums: Sums, into: Allocation): void {
+  const textures = [frame.background, ...sums.targets].map((texture) => texture.createView());
+  const buffers = [into.state, frame.statistics, sums.gathered, sums.kept, into.curves];
+  const options = { bins: bundle.bins, before: bundle.wgsl };
+  frame.forPixels(encoder, FILES, "predict_curves", [...buffers, ...textures], options);
+}
+
+/**
+ * Runs the rows of a bundle's self-test on this device.
+ *
+ * @throws Trouble The shader does not compile, or answers something else.
+ */
+export async function selfTest(gpu: Gpu, bundle: Bundle): Promise<void> {
+  const { features, outputs, output_scale: scale, tolerance } = bundle.selfTest;
+  const { STORAGE, COPY_SRC } = GPUBufferUsage;
+  gpu.device.pushErrorScope("validation");
+  const pipeline = gpu.compute(shader(["self_test"], bundle.bins, bundle.wgsl), "answer_rows");
+  const rows = gpu.filled(new Float32Array(features.flat()), STORAGE);
+  const answers = gpu.filled(new Float32Array(outputs.flat().length), STORAGE | COPY_SRC);
+  const encoder = gpu.device.createCommandEncoder();
+  const pass = encoder.beginComputePass();
+  pass.setPipeline(pipeline);
+  pass.setBindGroup(0, gpu.bind(pipeline, [rows, answers]));
+  pass.dispatchWorkgroups(Math.ceil(features.length / 16));
+  pass.end();
+  gpu.device.queue.submit([encoder.finish()]);
+  const found = new Float32Array((await gpu.read(answers)).buffer);
+  const invalid = await gpu.device.popErrorScope();
+  const wide = outputs[0]!.length;
+  const allowed = tolerance["predict.wgsl"] ?? 0;
+  const isRight = outputs.flat().every((value, i) => Math.abs(found[i]! - value) <= allowed * scale[i % wide]!);
+  rows.destroy();
+  answers.destroy();
+  if (invalid || !isRight) {
+    throw new Trouble(
+      `The network of '${bundle.name}' ${bundle.version} does not answer its self-test rightly on this device.`,
+      "Update the browser and the graphics driver; the other techniques work without it.",
+    );
+  }
+}

@@ -1,0 +1,191 @@
+// Published bundles, from the registry of the server that this page comes from: asked with the dashboard's session,
+// verified, and never an older one than was seen before.
+
+import type { ModelPage, ProblemDocument } from "./api";
+import type { Bundle } from "./bundle";
+import { MANIFEST, NETWORK, parseManifest } from "./manifest";
+import { type Release, isLower, parseRelease, sha256, verify } from "./release";
+import { Trouble } from "./trouble";
+
+/** Where the registry answers to a session. */
+export const REGISTRY = "/demo/v1";
+
+const KEY = "diaphane key";
+const NAME = /^[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?$/;
+const SELECTOR = /^[a-z0-9](?:[a-z0-9.-]{0,38}[a-z0-9])?$/;
+
+/** What is remembered between visits: the trusted key, and per alias the last record with its ETag. */
+export type Memory = Pick<Storage, "getItem" | "setItem" | "removeItem">;
+
+interface Seen {
+  readonly etag: string;
+  readonly record: string;
+}
+
+/** A model that can be asked for. */
+export interface Choice {
+  readonly name: string;
+  readonly selector: string;
+  readonly version: string;
+}
+
+/** There is no session: whoever wants models has to sign in. */
+export class SignedOut extends Trouble {
+  constructor() {
+    super("Nobody is signed in.", "Sign in to render with a published model.");
+  }
+}
+
+export class Registry {
+  /**
+   * @param memory Of this browser.
+   * @param ask `fetch`.
+   */
+  constructor(
+    private readonly memory: Memory,
+    private readonly ask: typeof fetch = (...args) => fetch(...args),
+  ) {}
+
+  /** All aliases of all models, champions first. */
+  async choices(): Promise<Choice[]> {
+    const found: Choice[] = [];
+    let address: string | null = `${REGISTRY}/models?limit=200`;
+    while (address) {
+      const answer: Response = await this.#get(address);
+      const page = (await answer.json()) as ModelPage;
+      for (const { name, aliases, latest } of page.items) {
+        const known = Object.entries(aliases);
+        for (const [selector, version] of known) found.push({ name, selector, version });
+        if (known.length === 0) found.push({ name, selector: latest, version: latest });
+      }
+      address = nextOf(answer);
+    }
+    const rank = (choice: Choice): number => (choice.selector === "champion" ? 0 : 1);
+    return found.sort((a, b) => rank(a) - rank(b));
+  }
+
+  /**
+   * Fetches a bundle and verifies it.
+   *
+   * @throws Trouble A hash, a signature, a key, a version or the manifest is not what it must be.
+   */
+  async pull(name: string, selector: string): Promise<Bundle> {
+    if (!NAME.test(name) || !SELECTOR.test(selector)) {
+      throw new Trouble(`There can be no '${name}' ${selector}.`, "Choose a model of the list.");
+    }
+    const trusted = this.memory.getItem(KEY);
+    const place = `diaphane ${name}@${selector}`;
+    const before = await this.#seen(place, name, selector, trusted);
+    const { etag, record } = await this.#record(name, selector, before?.seen ?? null);
+    const release = parseRelease(record);
+    const isSigned = await verify(release, name, selector, trusted);
+    if (before) checkOrder(release, before.release, selector);
+    const bundle = { ...(await this.#bundle(release)), isSigned };
+    // Remembered once all of it is right.
+    if (isSigned) this.memory.setItem(KEY, release.public_key);
+    this.memory.setItem(place, JSON.stringify({ etag, record }));
+    return bundle;
+  }
+
+  /** Forgets the trusted key, and which versions were seen of a model. */
+  forget(name: string, selector: string): void {
+    this.memory.removeItem(KEY);
+    this.memory.removeItem(`diaphane ${name}@${selector}`);
+  }
+
+  async #seen(
+    place: string,
+    name: string,
+    selector: string,
+    trusted: string | null,
+  ): Promise<{ seen: Seen; release: Release } | null> {
+    try {
+      const seen = JSON.parse(this.memory.getItem(place) ?? "null") as Seen;
+      const release = parseRelease(seen.record);
+      await verify(release, name, selector, trusted);
+      return { seen, release };
+    } catch {
+      return null; // nothing, or not written here
+    }
+  }
+
+  async #record(name: string, selector: string, seen: Seen | null): Promise<Seen> {
+    const headers: Record<string, string> = seen ? { "If-None-Match": seen.etag } : {};
+    const answer = await this.#get(`${REGISTRY}/models/${name}/versions/${selector}`, { headers, cache: "no-store" });
+    if (answer.status === 304 && seen) return seen;
+    return { etag: answer.headers.get("etag") ?? "", record: await answer.text() };
+  }
+
+  async #bundle(release: Release): Promise<Omit<Bundle, "isSigned">> {
+    const { name, version, files } = release;
+    const manifestText = new TextDecoder().decode(await this.#file(release, MANIFEST));
+    let manifest;
+    try {
+      manifest = parseManifest(manifestText);
+    } catch (error) {
+      const why = error instanceof Error ? error.message : String(error);
+      throw new Trouble(`'${name}' ${version} cannot be rendered here: ${why}.`, "Choose another model.");
+    }
+    const listed: Release["files"] = { ...manifest.files, [MANIFEST]: files[MANIFEST]! };
+    const isSame = Object.keys({ ...listed, ...files }).every((file) => files[file]?.sha256 === listed[file]?.sha256);
+    if (!isSame) {
+      throw new Trouble(
+        `The manifest of '${name}' ${version} lists other files than were published.`,
+        "Publish it again.",
+      );
+    }
+    // Every file, though only one is compiled: a damaged bundle is not half right.
+    const others = Object.keys(manifest.files);
+    const contents = await Promise.all(others.map((file) => this.#file(release, file)));
+    const wgsl = new TextDecoder().decode(contents[others.indexOf(NETWORK)]);
+    return { name, version, bins: manifest.bins, wgsl, selfTest: manifest.selfTest };
+  }
+
+  /** A file of a release, whose size and hash are right. */
+  async #file(release: Release, name: string): Promise<ArrayBuffer> {
+    const { sha256: hash, bytes } = release.files[name]!;
+    const content = await (await this.#get(`${REGISTRY}/blobs/sha256/${hash}`)).arrayBuffer();
+    if (content.byteLength !== bytes || (await sha256(content)) !== hash) {
+      throw new Trouble(
+        `${name} of '${release.name}' ${release.version} is not the file that was published.`,
+        "Load the page again; if it stays so, ask who runs the server.",
+      );
+    }
+    return content;
+  }
+
+  async #get(address: string, options: RequestInit = {}): Promise<Response> {
+    let answer: Response;
+    try {
+      answer = await this.ask(address, { credentials: "same-origin", redirect: "error", ...options });
+    } catch {
+      throw new Trouble("The server cannot be reached.", "Check the connection, then try again.");
+    }
+    if (answer.ok || answer.status === 304) return answer;
+    if (answer.status === 401) throw new SignedOut();
+    const problem = (await answer.json().catch(() => ({}))) as Partial<ProblemDocument>;
+    throw new Trouble(
+      problem.detail || problem.title || `The server answered ${answer.status}.`,
+      problem.remedy || "Try again.",
+    );
+  }
+}
+
+function checkOrder(release: Release, before: Release, selector: string): void {
+  if (isLower(release.version, before.version)) {
+    throw new Trouble(
+      `The server has ${release.version} for '${release.name}' ${selector}, which was ${before.version} before.`,
+      "If it was rolled back on purpose, forget what was seen below.",
+    );
+  }
+  if (release.version === before.version && release.digest !== before.digest) {
+    throw new Trouble(
+      `'${release.name}' ${release.version} has other files than it had before.`,
+      "Versions never change: ask who runs the server.",
+    );
+  }
+}
+
+function nextOf(answer: Response): string | null {
+  return /<(\/demo\/v1\/models[^>]*)>; rel="next"/.exec(answer.headers.get("link") ?? "")?.[1] ?? null;
+}

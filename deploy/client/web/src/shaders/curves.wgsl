@@ -1,0 +1,52 @@
+// The bundle's network on the gathered sums of every pixel with a choice: a and 1 / b of log gain(k) = a - b (k - 1)
+// (renderer/shaders/kbuffer-deep/curves.comp).
+@group(0) @binding(0) var<storage, read> state: State;
+@group(0) @binding(1) var<storage, read> statistics: array<Statistics>;
+@group(0) @binding(2) var<storage, read> gathered: array<u32>;
+@group(0) @binding(3) var<storage, read> kept: array<u32>;
+@group(0) @binding(4) var<storage, read_write> curves: array<vec2f>;
+@group(0) @binding(5) var background: texture_2d<f32>;
+@group(0) @binding(6) var sums0: texture_2d<f32>;
+@group(0) @binding(7) var sums1: texture_2d<f32>;
+@group(0) @binding(8) var sums2: texture_2d<f32>;
+@group(0) @binding(9) var sums3: texture_2d<f32>;
+
+// `clamp`, and the least for NaN, which a network that overflows can answer.
+fn within(x: f32, least: f32, most: f32) -> f32 {
+    let is_nan = (bitcast<u32>(x) & 0x7fffffffu) > 0x7f800000u;
+    return select(clamp(x, least, most), least, is_nan);
+}
+
+fn sums_of(p: u32) -> array<vec4f, 11> {
+    let size = textureDimensions(background);
+    let xy = vec2u(p % size.x, p / size.x);
+    let here = statistics[p];
+    let second = textureLoad(sums2, xy, 0);
+    let third = textureLoad(sums3, xy, 0);
+    let word = ~gathered[GATHERED * p + 1u];
+    let at = WORDS * p;
+    var s: array<vec4f, 11>;
+    s[0] = vec4f(f32(here.n), second.w, third.w, bitcast<f32>(kept[at]));
+    s[1] = textureLoad(sums0, xy, 0);
+    s[2] = textureLoad(sums1, xy, 0);
+    s[3] = vec4f(second.rgb, nearest(here));
+    s[4] = vec4f(third.rgb, bitcast<f32>(here.far));
+    s[5] = vec4f(vec4u(word, word >> 8u, word >> 16u, word >> 24u) & vec4u(255u)) / 255.0;
+    s[6] = vec4f(textureLoad(background, xy, 0).rgb, 0.0);
+    for (var b = 1u; b < BINS; b++) {  // bin b here is bin 16 / BINS * b of 16
+        let share = (kept[at + 1u + (b - 1u) / 8u] >> (4u * ((b - 1u) & 7u))) & 15u;
+        let j = 16u / BINS * b - 1u;
+        s[7u + j / 4u][j % 4u] = f32(share) / f32(SHARE_LEVELS);
+    }
+    return s;
+}
+
+@compute @workgroup_size(64)
+fn predict_curves(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let p = id.y * groups.x * 64u + id.x;
+    if (p >= arrayLength(&curves) || state.complete == 1u || statistics[p].n <= state.k_min) {
+        return;
+    }
+    let gain = diaphane_predict(diaphane_features(sums_of(p)));
+    curves[p] = vec2f(within(gain.x, -MOST_GAIN, MOST_GAIN), within(1.0 / gain.y, LEAST_RATE, MOST_RATE));
+}

@@ -1,0 +1,23 @@
+// The colour of all fragments as one weighted mean, with their total transmittance.
+@group(0) @binding(0) var background: texture_2d<f32>;  // gamma-2 encoded
+@group(0) @binding(1) var sums: texture_2d<f32>;        // sum w C, sum w
+@group(0) @binding(2) var depths: texture_2d<f32>;      // optical depth
+@group(0) @binding(3) var<storage, read_write> shown: array<u32>;
+
+@compute @workgroup_size(64)
+fn resolve_blended(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
+    let p = id.y * groups.x * 64u + id.x;
+    if (p >= arrayLength(&shown)) {
+        return;
+    }
+    let width = textureDimensions(background).x;
+    let xy = vec2u(p % width, p / width);
+    let root = textureLoad(background, xy, 0).rgb;
+    let sum = textureLoad(sums, xy, 0);
+    var colour = root * root;
+    if (sum.a > 0.0) {
+        let through = exp(-textureLoad(depths, xy, 0).r);
+        colour = (1.0 - through) * (sum.rgb / sum.a) + through * colour;
+    }
+    shown[p] = display_word(colour, 0u);
+}

@@ -1,0 +1,197 @@
+// The canvas: what is shown on it, drawn anew where something has changed, one picture at a time.
+
+import type { Bundle } from "./bundle";
+import { type View, framingView } from "./camera";
+import type { Gpu } from "./gpu";
+import { Geometry } from "./passes/geometry";
+import { type Mode, Screen, meanSquaredError } from "./passes/screen";
+import { type Counted, Renderer, type Technique } from "./renderer";
+import type { Scene } from "./scene";
+
+/** What one wants to see. */
+export interface Wanted {
+  left: Technique;
+  right: Technique;
+  mode: Mode;
+  /** Slots a pixel. */
+  factor: number;
+  /** Share of the width that the left picture has. */
+  split: number;
+}
+
+/** What a technique has cost, and its error; null as long as it is not measured. */
+export interface Figures {
+  readonly technique: Technique;
+  readonly milliseconds: number;
+  readonly slots: number;
+  readonly error: number | null;
+}
+
+export interface Report {
+  readonly counted: Counted;
+  readonly left: Figures;
+  readonly right: Figures;
+  readonly width: number;
+  readonly height: number;
+}
+
+/** A picture, read back. */
+export interface Picture {
+  /** sRGB and, in the highest byte, k of every pixel. */
+  readonly words: Uint32Array;
+  /** Where each pixel's slots begin, and the end of the last one's. */
+  readonly offsets: Uint32Array;
+  /** N of the view. */
+  readonly fragments: number;
+}
+
+/** Most pixels of a side. */
+const MOST = 1600;
+/** After so long without a change errors are measured, ms. */
+const REST = 250;
+
+export class Stage {
+  readonly wanted: Wanted = { left: "kbuffer", right: "weighted-blended", mode: "picture", factor: 1, split: 0.5 };
+  bundle: Bundle | null = null;
+  view: View | null = null;
+  readonly #screen: Screen;
+  #geometry: Geometry | null = null;
+  #renderer: Renderer | null = null;
+  #busy: Promise<void> | null = null;
+  #again = false;
+  #rest: ReturnType<typeof setTimeout> | undefined;
+  #shown: Record<"left" | "right" | "exact", GPUBuffer> | null = null;
+
+  /**
+   * @param told Gets what was drawn.
+   * @param failed Gets what went wrong.
+   */
+  constructor(
+    readonly gpu: Gpu,
+    readonly canvas: HTMLCanvasElement,
+    private readonly told: (report: Report) => void,
+    private readonly failed: (error: unknown) => void,
+  ) {
+    this.#screen = new Screen(gpu, canvas);
+  }
+
+  /** Shows another scene, all of it. */
+  async open(scene: Scene): Promise<void> {
+    while (this.#busy) await this.#busy;
+    this.#geometry?.destroy();
+    this.#geometry = new Geometry(this.gpu, scene);
+    this.#resize(true);
+    this.home();
+  }
+
+  /** Shows the whole scene. */
+  home(): void {
+    if (!this.#geometry) return;
+    const { bounds, up } = this.#geometry.scene;
+    this.view = framingView(bounds, up, this.canvas.width / this.canvas.height);
+    this.draw();
+  }
+
+  /** Draws soon; errors are measured when nothing changes for a while. */
+  draw(): void {
+    clearTimeout(this.#rest);
+    if (this.#busy) {
+      this.#again = true;
+      return;
+    }
+    this.#while(() => this.#drawAll());
+  }
+
+  /** Shows what was drawn once more, with another split or mode. */
+  present(): void {
+    if (this.#shown && this.#renderer && !this.#busy) this.#show(this.#renderer);
+  }
+
+  /** The picture of a technique at the canvas's size. */
+  async picture(view: View, technique: Technique, factor: number): Promise<Picture> {
+    while (this.#busy) await this.#busy;
+    clearTimeout(this.#rest);
+    return new Promise((resolve, reject) => {
+      this.#while(async () => {
+        try {
+          const renderer = this.#resize(false)!;
+          const { fragments } = await renderer.look(view);
+          const words = await this.gpu.read(renderer.render(technique, factor, this.bundle, "picture"));
+          resolve({ words, offsets: await this.gpu.read(renderer.offsets), fragments });
+        } catch (error) {
+          reject(error);
+        }
+      });
+    });
+  }
+
+  async #drawAll(): Promise<void> {
+    const renderer = this.#resize(false);
+    if (!renderer || !this.view) return;
+    const counted = await renderer.look(this.view);
+    const left = await this.#side(renderer, "left");
+    const right = await this.#side(renderer, "right");
+    const exact = renderer.frame.words("exact", renderer.frame.pixels);
+    this.#shown = { left: left.buffer, right: right.buffer, exact };
+    const { width, height } = renderer.frame;
+    if (this.wanted.mode === "error") renderer.render("sbuffer", 1, null, "exact");
+    this.#show(renderer);
+    this.told({ counted, left: left.figures, right: right.figures, width, height });
+    this.#rest = setTimeout(() => this.#measure(renderer, counted, left.figures, right.figures), REST);
+  }
+
+  async #side(renderer: Renderer, side: "left" | "right"): Promise<{ buffer: GPUBuffer; figures: Figures }> {
+    const technique = this.wanted[side];
+    const begun = performance.now();
+    const buffer = renderer.render(technique, this.wanted.factor, this.bundle, side);
+    await this.gpu.device.queue.onSubmittedWorkDone();
+    const milliseconds = performance.now() - begun;
+    return { buffer, figures: { technique, milliseconds, slots: renderer.slots, error: null } };
+  }
+
+  #measure(renderer: Renderer, counted: Counted, left: Figures, right: Figures): void {
+    if (this.#busy || !this.#shown || renderer !== this.#renderer) return;
+    const shown = this.#shown;
+    this.#while(async () => {
+      const exact = renderer.render("sbuffer", 1, null, "exact");
+      const errors: number[] = [];
+      for (const side of [shown.left, shown.right]) errors.push(await meanSquaredError(renderer.frame, side, exact));
+      const { width, height } = renderer.frame;
+      const measured = [left, right].map((figures, i) => ({ ...figures, error: errors[i]! }));
+      this.told({ counted, left: measured[0]!, right: measured[1]!, width, height });
+    });
+  }
+
+  /** Nothing else is drawn while this is. */
+  #while(work: () => Promise<void>): void {
+    this.#busy = work()
+      .catch(this.failed)
+      .finally(() => {
+        this.#busy = null;
+        if (!this.#again) return;
+        this.#again = false;
+        this.draw();
+      });
+  }
+
+  #show(renderer: Renderer): void {
+    const { left, right, exact } = this.#shown!;
+    const { mode, split } = this.wanted;
+    this.#screen.show(renderer.frame, mode, split * renderer.frame.width, left, right, exact);
+  }
+
+  /** The renderer of the canvas's size; a new one where it, or the scene, is another. */
+  #resize(anew: boolean): Renderer | null {
+    if (!this.#geometry) return null;
+    const box = this.canvas.getBoundingClientRect();
+    const width = Math.min(Math.max(Math.round(box.width), 1), MOST);
+    const height = Math.min(Math.max(Math.round(box.height), 1), MOST);
+    const before = this.#renderer;
+    if (!anew && before && before.frame.width === width && before.frame.height === height) return before;
+    before?.destroy();
+    this.#shown = null;
+    [this.canvas.width, this.canvas.height] = [width, height];
+    this.#renderer = new Renderer(this.gpu, this.#geometry, width, height);
+    return this.#renderer;
+  }
+}

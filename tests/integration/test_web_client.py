@@ -1,0 +1,265 @@
+"""The browser client as the service serves it: its pictures beside the renderer's, its page, its registry."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import moderngl
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from support.api import Api
+from support.browser import CHROMIUM, WEBGPU, Tab, browser
+from support.dashboard import Visitor
+from support.training import random_weights
+
+from renderer.capture import capture
+from renderer.convert import stage_file
+from renderer.features import derive, gather
+from renderer.frame import Frame
+from renderer.gpu_scene import GpuScene
+from renderer.samples.glb import HOME
+from renderer.scene import load_scene
+from renderer.techniques import Budget, KBuffer, KBufferDeep, SBuffer, Technique, WeightedBlended
+from renderer.views import framing_view
+from schemas.bundle import ParityReport, Provenance, TailSpec
+from schemas.colour import display8
+from services.dashboard import SESSION_ANSWERS, demo
+from services.dashboard.page import POLICY
+from trainer.bundle import Description, write_bundle
+
+SIZE = (480, 320)
+PIXELS = SIZE[0] * SIZE[1]
+GLB = HOME / "shells.glb"
+SIZED = """window.addEventListener('DOMContentLoaded', () => {
+    const style = { boxSizing: 'content-box', width: '480px', height: '320px', aspectRatio: 'auto' };
+    Object.assign(document.getElementById('stage')?.style ?? {}, style);
+})"""
+AUDIT = Path(__file__).with_name("dashboard_audit.js").read_text(encoding="utf-8").rstrip("\n;")
+SIGNED_OUT = "401 (Unauthorized)"
+"""What the browser itself says where nobody is signed in."""
+
+
+@pytest.fixture(scope="module")
+def frame(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Frame:
+    scene = load_scene(stage_file(GLB.parent, GLB.name, tmp_path_factory.mktemp("glb")))
+    return Frame(GpuScene(gl, scene), framing_view(scene), *SIZE)
+
+
+@pytest.fixture(scope="module")
+def bundle(frame: Frame, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("bundle")
+    provenance = Provenance(scenes={}, code_version="0", seed=0, machine="test")
+    described = Description("glass", TailSpec(name="density-16", g=0.75), "display", 1, provenance, {})
+    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver="none")
+    features = derive(gather(capture(frame).dump, bins=16))
+    write_bundle(folder, random_weights(11), described, features, lambda: parity)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def api(bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Api:
+    made = Api(tmp_path_factory.mktemp("service"), rate=1e6, burst=10**6)
+    made.service.registry.publish("glass", bundle, 0.5, {"views": 2})
+    made.service.registry.promote("glass", "1.0.0", "It is first.", who="key_000000000000")
+    return made
+
+
+@pytest.fixture(scope="module")
+def webgpu(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A browser with WebGPU."""
+    pytest.importorskip("playwright.sync_api")
+    if CHROMIUM is None:
+        pytest.skip("chromium is not installed")
+    with browser(tmp_path_factory.mktemp("browser"), WEBGPU) as started:
+        page = started.new_page()
+        page.goto("chrome://version")
+        if not page.evaluate("!!navigator.gpu && navigator.gpu.requestAdapter().then(Boolean)"):
+            pytest.skip("this chromium has no WebGPU adapter")
+        page.close()
+        yield started
+
+
+@pytest.fixture(scope="module")
+def tab(webgpu: Any, api: Api, url: str) -> Iterator[Tab]:
+    """Signed in, with the model loaded, at the size of the frame."""
+    opened = Tab(webgpu, url, 1280, "light")
+    opened.page.add_init_script(SIZED)
+    opened.sign_in(api.secrets["read"], "/models")
+    opened.page.goto("/demo")
+    opened.page.locator("#model-note").get_by_text("self-test passes").wait_for()
+    size = opened.page.evaluate("[canvas.clientWidth, canvas.clientHeight]")
+    assert size == list(SIZE)
+    yield opened
+    opened.context.close()
+
+
+def _pictured(
+    tab: Tab, frame: Frame, technique: str, factor: float
+) -> tuple[NDArray[np.uint8], NDArray[np.int64], int]:
+    """sRGB [H, W, 3] and slots [P] of the page's picture, and N of the view."""
+    view = {name: getattr(frame.view, name) for name in ("eye", "target", "up", "fov")}
+    found = tab.page.evaluate(
+        """async ([view, technique, factor]) => {
+            const { words, offsets, fragments } = await diaphane.picture(view, technique, factor);
+            return [Array.from(words), Array.from(offsets), fragments];
+        }""",
+        [view, technique, factor],
+    )
+    words, offsets = (np.array(numbers, dtype=np.uint32) for numbers in found[:2])
+    rgb = np.stack([words & 255, words >> 8 & 255, words >> 16 & 255], axis=-1)
+    return rgb.astype(np.uint8).reshape(SIZE[1], SIZE[0], 3), np.diff(offsets.astype(np.int64)), found[2]
+
+
+def _shares(picture: NDArray[np.uint8], linear: NDArray[np.float32]) -> float:
+    """Share of the pixels that agree within 2 of 255."""
+    apart = np.abs(picture.astype(int) - display8(linear).astype(int)).max(axis=2)
+    return float(np.mean(apart <= 2))
+
+
+@pytest.mark.parametrize(
+    ("technique", "factor"),
+    [(SBuffer(), 1.0), (WeightedBlended(), 1.0), (KBuffer(), 2.0)],
+    ids=["sbuffer", "weighted-blended", "kbuffer"],
+)
+def test_pictures_are_the_renderers(tab: Tab, frame: Frame, technique: Technique, factor: float) -> None:
+    picture, _, _ = _pictured(tab, frame, technique.name, factor)
+    expected = technique.render(frame, Budget(int(factor * PIXELS)))
+    assert _shares(picture, expected.linear) >= 0.999
+    assert tab.faults == []
+
+
+def test_half_floats_do_where_float32_is_not_blended(webgpu: Any, api: Api, url: str, frame: Frame) -> None:
+    opened = Tab(webgpu, url, 1280, "light")
+    opened.page.add_init_script(SIZED)
+    opened.page.add_init_script(
+        """const { has } = GPUSupportedFeatures.prototype;
+        GPUSupportedFeatures.prototype.has = function (name) {
+            return name !== 'float32-blendable' && has.call(this, name);
+        };"""
+    )
+    opened.page.goto("/demo")
+    opened.page.locator("#figures tr").nth(1).wait_for()
+    for technique in (KBuffer(), WeightedBlended()):
+        picture, _, _ = _pictured(opened, frame, technique.name, 1.0)
+        assert _shares(picture, technique.render(frame, Budget(PIXELS)).linear) >= 0.999
+    assert [fault for fault in opened.faults if SIGNED_OUT not in fault] == []
+    opened.context.close()
+
+
+def test_predicted_slots_use_the_budget_exactly(tab: Tab, frame: Frame, bundle: Path) -> None:
+    """From less than a slot for every occupied pixel to more than there are fragments."""
+    deep = KBufferDeep(bundle)
+    for factor in (0.1, 0.5, 4.0):
+        picture, k, total = _pictured(tab, frame, "kbuffer-deep", factor)
+        expected = deep.render(frame, Budget(int(factor * PIXELS)))
+        assert k.sum() == min(int(factor * PIXELS), total)
+        assert np.mean(k == expected.k) > 0.98
+        assert _shares(picture, expected.linear) >= 0.999
+    assert tab.faults == []
+
+
+def test_errors_are_measured_against_the_exact_picture(tab: Tab) -> None:
+    page = tab.page
+    page.get_by_label("Right").select_option("sbuffer")
+    page.locator("#figures tr").nth(1).get_by_text("exact", exact=True).wait_for()
+    left = page.locator("#figures tr").nth(0).locator("td")
+    assert 0.0 < float(left.nth(0).inner_text()) < 1000.0
+    assert 20.0 < float(left.nth(1).inner_text()) < 90.0
+    page.get_by_label("Right").select_option("kbuffer-deep")
+    page.get_by_label("Shown").select_option("count")
+    page.locator("#figures tr").nth(1).get_by_text("kbuffer-deep").wait_for()
+    assert page.locator("#legend").is_visible()
+    page.get_by_label("Shown").select_option("picture")
+    assert tab.faults == []
+
+
+def test_the_keyboard_turns_and_splits(tab: Tab) -> None:
+    page = tab.page
+    page.locator("#stage").focus()
+    page.keyboard.press("]")
+    assert page.get_by_label("Split").input_value() == "55"
+    before = page.locator("#facts").inner_text()
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("+")
+    page.wait_for_timeout(100)
+    page.locator("#facts").filter(has_not_text=before).wait_for()
+    page.keyboard.press("0")
+    page.keyboard.press("[")
+    assert tab.faults == []
+
+
+def test_files_are_opened_or_refused_with_a_remedy(tab: Tab, tmp_path: Path) -> None:
+    page = tab.page
+    damaged = tmp_path / "damaged.glb"
+    damaged.write_bytes(GLB.read_bytes()[:500])
+    page.get_by_label("A file of your own").set_input_files(damaged)
+    page.get_by_role("alert").get_by_text("damaged.glb cannot be read").wait_for()
+    page.get_by_label("A file of your own").set_input_files(HOME / "shelf.glb")
+    page.get_by_role("alert").wait_for(state="hidden")
+    assert page.get_by_label("Scene").locator("option").nth(0).inner_text() == "shelf.glb"
+    assert tab.faults == []
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(640, "light"), (360, "dark")])
+def test_nobody_signed_in_sees_what_needs_no_model(webgpu: Any, url: str, width: int, scheme: str) -> None:
+    opened = Tab(webgpu, url, width, scheme)
+    page = opened.page
+    page.goto("/demo")
+    page.locator("#figures tr").nth(1).wait_for()
+    assert page.get_by_role("link", name="Sign in").get_attribute("href") == "/sign-in?next=%2Fdemo"
+    assert page.get_by_label("Left").locator("option[value=kbuffer-deep]").count() == 0
+    assert page.get_by_role("alert").count() == 0
+    assert page.evaluate(AUDIT) == []
+    assert page.evaluate("document.scrollingElement.scrollWidth") <= width
+    assert [fault for fault in opened.faults if SIGNED_OUT not in fault] == []
+    opened.context.close()
+
+
+def test_without_webgpu_the_page_says_what_to_do(webgpu: Any, url: str) -> None:
+    opened = Tab(webgpu, url, 1280, "dark")
+    opened.page.add_init_script("Object.defineProperty(Navigator.prototype, 'gpu', { value: undefined })")
+    opened.page.goto("/demo")
+    opened.page.get_by_role("alert").get_by_text("no WebGPU").wait_for()
+    assert opened.page.get_by_label("Left").is_disabled()
+    assert opened.page.evaluate(AUDIT) == []
+    assert opened.faults == []
+    opened.context.close()
+
+
+def test_the_page_is_open_and_strict(api: Api) -> None:
+    answer = Visitor(api, None).get("/demo")
+    assert answer.status_code == 200
+    assert answer.headers["content-security-policy"] == POLICY
+    assert "<script>" not in answer.text
+    assert "style=" not in answer.text
+    assert Visitor(api, None).get("/demo", **{"If-None-Match": answer.headers["etag"]}).status_code == 304
+    for name in ("../index.html", "%2e%2e%2findex.html", "none.js", "..%2f..%2fdashboard.css"):
+        assert Visitor(api, None).get(f"/demo/assets/{name}").status_code == 404
+    for path in (demo.BUILT / "assets").iterdir():
+        asset = Visitor(api, None).get(f"/demo/assets/{path.name}")
+        assert asset.content == path.read_bytes()
+        assert "immutable" in asset.headers["cache-control"]
+
+
+def test_the_registry_answers_to_a_session_as_to_a_key(api: Api) -> None:
+    visitor = Visitor(api, "read")
+    blob = api.get("/v1/models/glass/versions/champion").json()["files"]["predict.wgsl"]["sha256"]
+    paths = ("/models", "/models/glass/versions/champion", f"/blobs/sha256/{blob}")
+    assert {route.path for router in SESSION_ANSWERS for route in router.routes} == {  # type: ignore[attr-defined]
+        "/demo/v1/models",
+        "/demo/v1/models/{name}/versions/{version}",
+        "/demo/v1/blobs/sha256/{sha256}",
+    }
+    for path in paths:
+        assert visitor.get(f"/demo/v1{path}").content == api.get(f"/v1{path}").content
+        for stranger in (Visitor(api, None).client.get(f"/demo/v1{path}"), api.get(f"/demo/v1{path}", "admin")):
+            assert stranger.status_code == 401  # a key is none here
+            assert stranger.headers["content-type"] == "application/problem+json"
+        assert visitor.client.post(f"/demo/v1{path}").status_code == 405
+
+
+def test_the_build_is_small() -> None:
+    assert sum(path.stat().st_size for path in demo.BUILT.rglob("*") if path.is_file()) < 300_000
