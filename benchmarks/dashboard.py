@@ -1,5 +1,7 @@
 """How long the dashboard's pages take with 200 models, 1,000 jobs and 10,000 measurements: the server, and the paint.
 
+And the parts of the page Compare at 1430x960: a pixel that was not looked at before, and pictures that are made anew.
+
 python -m benchmarks.dashboard --out benchmarks/results/dashboard.json
 """
 
@@ -8,6 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import random
 import shutil
 import statistics
 import sys
@@ -21,6 +24,7 @@ from typing import Any
 
 import httpx
 
+from benchmarks import compared_view
 from benchmarks.load.seed import SCENES, WHO, Seed, seed
 from benchmarks.load.service import Service as Served
 from schemas.job import JobSpec
@@ -57,7 +61,9 @@ def main() -> int:
         key, pages = fill(Settings(state=folder / "state"), folder)
         with Served(folder / "state", "none", _UNLIMITED) as service:
             service.wait_ready(600.0)
-            found["pages"] = measure(f"http://127.0.0.1:{service.port}", key, pages, arguments.rounds)
+            url = f"http://127.0.0.1:{service.port}"
+            found["pages"] = measure(url, key, pages, arguments.rounds)
+            found["compare_ms"] = measure_compare(url, key, pages["compare"], arguments.rounds)
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     arguments.out.parent.mkdir(parents=True, exist_ok=True)
@@ -65,6 +71,8 @@ def main() -> int:
     print(f"{'page':10} {'server, ms':>10} {'paint, ms':>10} {'kB':>6}")
     for name, one in found["pages"].items():
         print(f"{name:10} {one['server_ms']:10.1f} {one.get('paint_ms', float('nan')):10.1f} {one['kilobytes']:6.0f}")
+    for name, milliseconds in found["compare_ms"].items():
+        print(f"{name:24} {milliseconds:10.1f} ms")
     slowest = max(one.get("paint_ms", one["server_ms"]) for one in found["pages"].values())
     return 1 if slowest > 1e3 * SECONDS else 0
 
@@ -88,6 +96,7 @@ def fill(settings: Settings, folder: Path) -> tuple[str, dict[str, str]]:
         with service.database.write() as connection:  # what was measured was measured on the one scene there is
             mine = tables.measurements.c.scene == SCENES[0]
             connection.execute(tables.measurements.update().where(mine).values(scene_digest=scene.digest))
+        compared = f"/compare?scene={scene.id}&{compared_view.make(service, scene.digest)}"
         service.database.close()
     return made.key, {
         "overview": "/",
@@ -97,6 +106,7 @@ def fill(settings: Settings, folder: Path) -> tuple[str, dict[str, str]]:
         "model": "/models/glass",
         "scenes": "/scenes",
         "scene": f"/scenes/{scene.id}",
+        "compare": compared,
     }
 
 
@@ -119,6 +129,30 @@ def measure(url: str, secret: str, pages: Mapping[str, str], rounds: int) -> dic
     for name, paint in _paints(url, secret, pages, rounds).items():
         found[name]["paint_ms"] = paint
     return found
+
+
+def measure_compare(url: str, secret: str, page: str, rounds: int) -> dict[str, float]:
+    """Parts of the page Compare, ms: the first of its kind, and the median of further pixels."""
+    where, found = page.partition("?")[2], {}
+    with httpx.Client(base_url=url, timeout=60.0) as client:
+        signed_in = client.post("/sign-in", data={"key": secret}, headers={"Origin": url})
+        assert signed_in.status_code == 303, signed_in.text
+
+        def took(path: str) -> float:
+            begun = time.perf_counter()
+            answer = client.get(path)
+            assert answer.status_code == 200, (path, answer.status_code)
+            return 1e3 * (time.perf_counter() - begun)
+
+        chosen, (width, height) = random.Random(0), compared_view.SIZE
+        pixels = [f"x={chosen.randrange(width)}&y={chosen.randrange(height)}" for _ in range(5 * rounds)]
+        found["first pixel"], *others = (took(f"/compare/pixel?{where}&{pixel}") for pixel in pixels)
+        found["another pixel"] = statistics.median(others)
+        found["another pixel, worst"] = max(others)
+        for show in ("picture", "k", "difference", "flip"):
+            found[show] = took(f"/compare/picture.png?{where}&show={show}")
+        found["flip again"] = took(f"/compare/picture.png?{where}&show=flip")
+    return {name: round(milliseconds, 1) for name, milliseconds in found.items()}
 
 
 def _paints(url: str, secret: str, pages: Mapping[str, str], rounds: int) -> dict[str, float]:

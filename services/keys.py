@@ -12,7 +12,7 @@ import re
 import secrets
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import sqlalchemy as sa
@@ -110,6 +110,12 @@ class Keys:
         with self._database.read() as connection:
             rows = connection.execute(sa.select(table).order_by(table.c.created.desc(), table.c.id)).mappings()
             return [_record(row) for row in rows]
+
+    def names(self, ids: Collection[str]) -> dict[str, str]:
+        """Names of keys by id, the revoked ones too; what is no id of a key is left out."""
+        with self._database.read() as connection:
+            rows = connection.execute(sa.select(table.c.id, table.c.name).where(table.c.id.in_(set(ids))))
+            return {row.id: row.name for row in rows}
 
     def revoke(self, key_id: str) -> KeyRecord:
         """Revokes a key; revoking it again changes nothing.

@@ -17,7 +17,7 @@ from services.api.metrics import Metrics
 from services.api.observe import LOOPBACK, Observe
 from services.api.routes import GUARDED, OPEN, routes, scope_of
 from services.api.security import Guard
-from services.dashboard import OPEN_PAGES, PAGES
+from services.dashboard import OPEN_PAGES, PAGES, SESSION_ANSWERS, refusals
 from services.service import Service
 
 THREADS = 48
@@ -40,7 +40,7 @@ def create_app(service: Service, *, hosts: Sequence[str] = LOOPBACK) -> FastAPI:
         redirect_slashes=False,
         lifespan=_lifespan,
     )
-    for route in routes((*GUARDED, *PAGES)):
+    for route in routes((*GUARDED, *PAGES, *SESSION_ANSWERS)):
         scope_of(route)  # a route that forgot to say which scope it needs is found here, not by a stranger
     settings = service.settings
     feeds = Feeds(service.database)
@@ -49,7 +49,7 @@ def create_app(service: Service, *, hosts: Sequence[str] = LOOPBACK) -> FastAPI:
     app.state.metrics = Metrics(service, feeds)
     app.state.readiness = Readiness(service)
     app.state.guard = guard = Guard(service.keys, settings.rate, settings.burst)
-    app.state.routers = (*GUARDED, *OPEN, *PAGES, *OPEN_PAGES)
+    app.state.routers = (*GUARDED, *OPEN, *PAGES, *SESSION_ANSWERS, *OPEN_PAGES)
 
     root = APIRouter(dependencies=[Depends(guard)])
     for router in GUARDED:
@@ -58,9 +58,14 @@ def create_app(service: Service, *, hosts: Sequence[str] = LOOPBACK) -> FastAPI:
     for router in OPEN:
         app.include_router(router)
     dashboard.install(app, service)
-    errors.install(app)
+    errors.install(app, refusals.answer)
     app.add_middleware(
-        Observe, metrics=app.state.metrics, hosts=hosts, window=settings.burst / settings.rate, burst=settings.burst
+        Observe,
+        metrics=app.state.metrics,
+        answer=refusals.answer,
+        hosts=hosts,
+        window=settings.burst / settings.rate,
+        burst=settings.burst,
     )
     return app
 

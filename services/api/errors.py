@@ -1,4 +1,4 @@
-"""Every error as `application/problem+json`."""
+"""Every error as an answer: `application/problem+json`, unless the application says otherwise."""
 
 from __future__ import annotations
 
@@ -35,6 +35,9 @@ _OF_STATUS = {
     503: "unavailable",
 }
 
+Answer = Callable[[Refusal, Any], Response]
+"""Makes the response to a request that is refused, given the request's scope (ASGI)."""
+
 log = structlog.get_logger("diaphane.api")
 
 
@@ -70,8 +73,13 @@ def refusal_for(error: Exception) -> Refusal | None:
     return None
 
 
-def install(app: FastAPI) -> None:
-    """Makes every error of the application a problem document."""
+def install(app: FastAPI, answer: Answer = answer) -> None:
+    """Makes every error of the application an answer.
+
+    Args:
+        app: The application.
+        answer: Makes them; the default makes each a problem document.
+    """
 
     async def handle(request: Request, error: Exception) -> Response:
         if isinstance(error, HTTPException) and error.status_code == 405:

@@ -13,7 +13,7 @@ import structlog
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from services.api.errors import answer, refusal_for
+from services.api.errors import Answer, refusal_for
 from services.api.metrics import Metrics
 from services.api.rate import Allowance
 from services.problems import Refusal
@@ -44,13 +44,16 @@ class Observe:
     Args:
         app: The application.
         metrics: Where requests are counted.
+        answer: Makes the answer to a request that is refused here.
         hosts: Names that the server answers for; `*`: any.
         window: Seconds in which a key's bucket fills, as the RateLimit headers tell it.
         burst: Requests that a bucket holds.
     """
 
-    def __init__(self, app: ASGIApp, metrics: Metrics, hosts: Sequence[str], window: float, burst: int) -> None:
-        self._app, self._metrics = app, metrics
+    def __init__(
+        self, app: ASGIApp, metrics: Metrics, answer: Answer, hosts: Sequence[str], window: float, burst: int
+    ) -> None:
+        self._app, self._metrics, self.answer = app, metrics, answer
         self._hosts = None if "*" in hosts else frozenset(host.lower() for host in hosts)
         self._policy = f'"key";q={burst};w={max(1, round(window))}'
 
@@ -99,7 +102,7 @@ class _Exchange:
                 if self._observer.answers_for(self._request.get("host", "")):
                     await app(self._scope, self.receive, self.send)
                 else:
-                    await answer(Refusal("misdirected"), self._scope)(self._scope, self._receive, self.send)
+                    await self._refuse(Refusal("misdirected"))
             except Exception as error:
                 refusal = refusal_for(error)
                 if refusal is None:
@@ -107,9 +110,12 @@ class _Exchange:
                     log.error("unexpected error", exception="".join(format_exception(error)))
                 if self._first is not None:
                     raise  # the answer has begun: the server closes the connection
-                await answer(refusal or Refusal("internal"), self._scope)(self._scope, self._receive, self.send)
+                await self._refuse(refusal or Refusal("internal"))
             finally:
                 self._finish()
+
+    async def _refuse(self, refusal: Refusal) -> None:
+        await self._observer.answer(refusal, self._scope)(self._scope, self._receive, self.send)
 
     async def receive(self) -> Message:
         message = await self._receive()

@@ -6,16 +6,26 @@ refresh parts of pages and show values of charts: everything works without them.
 
 from fastapi import APIRouter, Depends, FastAPI
 
-from services.dashboard import assets, jobs, models, overview, scenes, sign_in, sign_out
+from services.dashboard import assets, compare, demo, jobs, models, overview, scenes, sign_in, sign_out
 from services.dashboard.live import Watch
 from services.dashboard.sessions import Sessions
 from services.dashboard.visitor import Visitor
 from services.service import Service
 
-PAGES: tuple[APIRouter, ...] = (overview.router, jobs.router, models.router, scenes.router, sign_out.router)
+PAGES: tuple[APIRouter, ...] = (
+    overview.router,
+    jobs.router,
+    models.router,
+    scenes.router,
+    compare.router,
+    sign_out.router,
+)
 """Those that need a session."""
 
-OPEN_PAGES: tuple[APIRouter, ...] = (sign_in.router, assets.router)
+SESSION_ANSWERS: tuple[APIRouter, ...] = (demo.router,)
+"""What scripts ask for with a session; refusals are problem documents."""
+
+OPEN_PAGES: tuple[APIRouter, ...] = (sign_in.router, assets.router, demo.open_router)
 """Those that do not."""
 
 
@@ -28,8 +38,9 @@ def install(app: FastAPI, service: Service) -> None:
     """
     app.state.sessions = Sessions(service.database, service.keys)
     app.state.watch = Watch(service)
+    app.state.comparer = compare.Comparer(service)
     guarded = APIRouter(dependencies=[Depends(Visitor(app.state.guard, app.state.sessions))])
-    for router in PAGES:
+    for router in (*PAGES, *SESSION_ANSWERS):
         guarded.include_router(router)
     app.include_router(guarded)
     for router in OPEN_PAGES:

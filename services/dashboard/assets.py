@@ -12,7 +12,7 @@ from fastapi import Path as InPath
 
 from services.api.etags import is_current
 from services.problems import Refusal
-from services.report.colours import COUNT, css_gradient
+from services.report.colours import COUNT, HEAT, css_gradient
 from services.report.page import TEMPLATES
 
 HTMX = "2.0.11"
@@ -23,8 +23,9 @@ router = APIRouter(prefix="/static", include_in_schema=False)
 _FOLDER = Path(__file__).resolve().parent / "static"
 _SOURCES: dict[str, tuple[str, tuple[Path, ...]]] = {
     # Colours, tables and charts are those of the reports.
-    "dashboard.css": ("text/css", (TEMPLATES / "report.css", _FOLDER / "dashboard.css")),
+    "dashboard.css": ("text/css", (TEMPLATES / "report.css", _FOLDER / "dashboard.css", _FOLDER / "compare.css")),
     "dashboard.js": ("text/javascript", (_FOLDER / "dashboard.js",)),
+    "compare.js": ("text/javascript", (_FOLDER / "compare.js",)),
     "htmx.min.js": ("text/javascript", (_FOLDER / "htmx.min.js",)),
     "htmx.LICENSE.txt": ("text/plain", (_FOLDER / "htmx.LICENSE.txt",)),
     "icon.svg": ("image/svg+xml", (_FOLDER / "icon.svg",)),
@@ -37,7 +38,8 @@ def content(name: str) -> tuple[bytes, str]:
     """A file, and the hex sha256 of its content."""
     made = b"\n".join(path.read_bytes() for path in _SOURCES[name][1])
     if name == "dashboard.css":
-        made += f".ramp .count {{ background: {css_gradient(COUNT)}; }}\n".encode()
+        for kind, anchors in (("count", COUNT), ("heat", HEAT)):
+            made += f".ramp .{kind} {{ background: {css_gradient(anchors)}; }}\n".encode()
     return made, hashlib.sha256(made).hexdigest()
 
 

@@ -90,6 +90,7 @@ def show_job(
         log=[_line(event) for event in service.jobs.events(job_id, max(0, last - _LOG_EVENTS), _LOG_EVENTS)][::-1],
         last=last,
         is_live=not final,
+        key_names=service.keys.names({job.submitted_by}),
         address=f"{request.url.path}?{request.url.query}" if request.url.query else request.url.path,
         can_retry=job.state in ("failed", "cancelled"),
         can_cancel=job.state not in (*FINAL_STATES, "cancelling"),

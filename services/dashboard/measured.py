@@ -12,6 +12,7 @@ from markupsafe import Markup
 
 from schemas.measurement import Measurement
 from services import summary
+from services.dashboard.scene_views import setting_of
 from services.database import Database
 from services.database.tables import measurements as table
 from services.report import charts
@@ -96,6 +97,7 @@ def history(database: Database, name: str, versions: Sequence[str]) -> list[Scen
             table.c.budget_factor,
             data["budget"].as_integer().label("budget"),
             data["alpha"].as_float().label("alpha"),
+            data["total_fragments"].as_integer().label("fragments"),  # two cameras may have the same name
             data["mse"].as_float().label("mse"),
         )
         .where(table.c.model.in_(shown), table.c.technique == summary.BUNDLE, data["exact"].as_boolean().is_(False))
@@ -107,7 +109,8 @@ def history(database: Database, name: str, versions: Sequence[str]) -> list[Scen
         for row in connection.execute(query):
             if row.mse is not None:
                 errors = found[row.scene, row.scene_digest][row.model]
-                errors.setdefault((row.view, row.budget_factor, row.budget, row.alpha), max(row.mse, summary.MSE_FLOOR))
+                picture = row.view, row.fragments, row.budget_factor, row.budget, row.alpha
+                errors.setdefault(picture, max(row.mse, summary.MSE_FLOOR))
     titles = _titles(found)
     return [SceneHistory(titles[scene], _compared(found[scene], shown)) for scene in sorted(found)]
 
@@ -166,8 +169,7 @@ def _latest(condition: sa.ColumnElement[bool]) -> sa.Select[Any]:
 
 
 def _view_key(row: Any) -> tuple[Any, ...]:
-    data = row.data
-    return (row.scene_digest, row.view, data["width"], data["height"], data["alpha"], data["tail"])
+    return (row.scene_digest, row.view, *setting_of(row.data))
 
 
 def _unique(rows: Iterable[Any]) -> list[Measurement]:

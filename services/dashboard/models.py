@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated
 
 from anyio import to_thread
@@ -10,6 +11,7 @@ from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, StringConstraints
 
 from schemas.bundle import WEIGHTS, Manifest
+from schemas.measurement import Measurement
 from schemas.problem import ExitCode, Problem
 from services.api.answers import Reason, VersionOrAlias
 from services.api.pages import Page
@@ -22,6 +24,7 @@ from services.dashboard.page import PageRoute, redirect, render
 from services.dashboard.visitor import FormBody
 from services.problems import Refusal
 from services.registry.records import CANDIDATE, CHAMPION
+from services.summary import BUNDLE
 
 router = APIRouter(prefix="/models", route_class=PageRoute, include_in_schema=False)
 _publish = [Depends(Needs("publish"))]
@@ -82,6 +85,7 @@ def show_model(
     recent = [publication.version for publication in published[-_VERSIONS_COMPARED:]]
     scenes = measured.history(service.database, name, recent)
     own = measured.of_version(service.database, reference)
+    moves = registry.moves(name)[::-1][:_MOVES]
     manifest = registry.manifest(chosen)
     return render(
         request,
@@ -90,14 +94,15 @@ def show_model(
         reference=reference,
         record=registry.record(chosen),
         manifest=manifest,
-        cost=_cost(manifest),
+        cost=_cost(manifest, own),
         versions=paging.slice(published[::-1], lambda publication: publication.version),
         count=len(published),
         numbers=[publication.version for publication in published[::-1]][:200],
         paging=paging,
         aliases=aliases,
         aliases_offered=sorted({CHAMPION, CANDIDATE, *aliases}),
-        moves=registry.moves(name)[::-1][:_MOVES],
+        moves=moves,
+        key_names=service.keys.names({move.who for move in moves}),
         recent=recent,
         scenes=scenes,
         history=measured.history_chart(scenes, recent),
@@ -144,12 +149,21 @@ def roll_back(
     return redirect(f"/models/{name}#aliases")
 
 
-def _cost(manifest: Manifest) -> dict[str, int]:
-    """What a run of the network is made of: counts, and bytes."""
+def _cost(manifest: Manifest, own: Sequence[Measurement]) -> dict[str, int | None]:
+    """What a frame with a version is made of: counts and bytes.
+
+    Args:
+        manifest: Of the version.
+        own: Pictures that were measured on its views; its own say which buffers its frames need.
+    """
+    buffers = [m.pixel_bytes for m in own if m.technique == BUNDLE and m.pixel_bytes is not None]
+    peaks = [m.total_bytes for m in own if m.technique == BUNDLE and m.total_bytes is not None]
     return {
         "weights": manifest.weight_count,
         "multiply_adds": sum(math.prod(layer.shape) for layer in manifest.layers if layer.layout == "out,in"),
         "features": len(manifest.features),
-        "feature_bytes": 4 * len(manifest.features),
+        "input_bytes": 4 * len(manifest.features),
+        "buffer_bytes": max(buffers, default=None),
+        "peak_bytes": max(peaks, default=None),
         "file_bytes": manifest.files[WEIGHTS].bytes,
     }

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Coroutine
-from datetime import UTC, datetime
+import time
+from collections.abc import Callable, Coroutine, Mapping
+from datetime import datetime
 from functools import cache
 from traceback import format_exception
-from typing import Any
+from typing import Any, Final
 from urllib.parse import quote
 
 import structlog
@@ -32,11 +33,28 @@ POLICY = (
 # Not `no-referrer`: browsers would then hide where a form comes from.
 HEADERS = {"Content-Security-Policy": POLICY, "Referrer-Policy": "same-origin"}
 
-PAGES = (("/", "Overview"), ("/jobs", "Jobs"), ("/models", "Models"), ("/scenes", "Scenes"))
+PAGES = (
+    ("/", "Overview"),
+    ("/jobs", "Jobs"),
+    ("/models", "Models"),
+    ("/scenes", "Scenes"),
+    ("/compare", "Compare"),
+    ("/demo", "Demo"),
+)
 """What the navigation leads to."""
 
 _LOCAL = re.compile(r"/(?![/\\])[\x21-\x5b\x5d-\x7e]*")
 _UNITS = ((86400.0, "d"), (3600.0, "h"), (60.0, "min"), (1.0, "s"))
+
+_AGAIN = frozenset({429, 500, 503})
+"""Statuses after which the same request may well succeed."""
+
+# The catalogue speaks to those who write clients.
+_REMEDIES: Final[Mapping[str, str]] = {
+    "not-found": "Check the address, or look for what you want in the lists below.",
+    "method-not-allowed": "The address belongs to a button or a form: go back to its page, and use that.",
+    "forbidden": "Sign out, and sign in with a key that has the scope; `diaphane keys create` makes one.",
+}
 
 log = structlog.get_logger("diaphane.dashboard")
 
@@ -80,6 +98,26 @@ def is_local(address_of: str) -> bool:
     return _LOCAL.fullmatch(address_of) is not None
 
 
+def problem_page(request: Request, refusal: Refusal) -> Response:
+    """A page that says what is wrong, and what to do."""
+    status = refusal.type.status
+    problem = refusal.document(request_id=request.state.request_id)
+    if not refusal.remedy:
+        problem = problem.model_copy(update={"remedy": _remedy(refusal)})
+    asked = _asked(request)
+    again = asked if status in _AGAIN and request.method == "GET" and is_local(asked) else ""
+    page = render(request, "problem", status, problem=problem, again=again)
+    page.headers.update(refusal.headers)
+    return page
+
+
+def _remedy(refusal: Refusal) -> str:
+    wait = refusal.headers.get("Retry-After", "")
+    if refusal.type.slug == "too-many-requests" and wait.isdecimal():
+        return f"Wait {wait} second{'' if wait == '1' else 's'}, then try again."
+    return _REMEDIES.get(refusal.type.slug, refusal.type.remedy)
+
+
 class PageRoute(APIRoute):
     """A route whose errors are pages, and which sends whoever is not signed in to where one does."""
 
@@ -103,20 +141,23 @@ def _problem_page(request: Request, error: Exception) -> Response:
         refusal = Refusal("internal")
     if refusal.type.slug == "unauthenticated":
         return _to_sign_in(request)
-    problem = refusal.document(request_id=request.state.request_id)
-    page = render(request, "problem", refusal.type.status, problem=problem)
-    page.headers.update(refusal.headers)
-    return page
+    return problem_page(request, refusal)
 
 
 def _to_sign_in(request: Request) -> Response:
-    asked = request.url.path + (f"?{request.url.query}" if request.url.query else "")
+    asked = _asked(request)
     to = "/sign-in"
     if request.headers.get("hx-request") == "true":  # a part of a page: the whole page has to go
         return Response(status_code=401, headers={**HEADERS, "HX-Redirect": to})
     if request.method == "GET" and asked != "/" and is_local(asked):
         to += f"?next={quote(asked, safe='')}"
     return redirect(to)
+
+
+def _asked(request: Request) -> str:
+    """Path and query of a request; not from its `url`, which the header `Host` is a part of."""
+    query = request.scope["query_string"].decode("latin-1")
+    return quote(request.scope["path"], safe="/:@!$&'()*+,;=~") + (f"?{query}" if query else "")
 
 
 @cache
@@ -131,9 +172,9 @@ def when(moment: str | None) -> str:
     """A time (ISO 8601, UTC): how long ago, and exactly where one points at it."""
     if moment is None:
         return "–"
-    time = datetime.fromisoformat(moment)
-    ago = duration((datetime.now(UTC) - time).total_seconds())
-    exact = f"{time:%Y-%m-%d %H:%M:%S} UTC"
+    then = datetime.fromisoformat(moment)
+    ago = duration(time.time() - then.timestamp())
+    exact = f"{then:%Y-%m-%d %H:%M:%S} UTC"
     return Markup('<time datetime="{}" title="{}">{} ago</time>').format(moment, exact, ago)
 
 
@@ -153,8 +194,8 @@ def duration(seconds: float | None) -> str:
 def _took(job: JobRecord) -> str:
     if job.started is None:
         return "–"
-    end = datetime.fromisoformat(job.finished) if job.finished else datetime.now(UTC)
-    return duration((end - datetime.fromisoformat(job.started)).total_seconds())
+    end = datetime.fromisoformat(job.finished).timestamp() if job.finished else time.time()
+    return duration(end - datetime.fromisoformat(job.started).timestamp())
 
 
 def _percent(fraction: float) -> str:

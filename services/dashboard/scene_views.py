@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,10 +13,10 @@ from schemas.measurement import Certificate, Measurement
 from services import summary
 from services.database import Database
 from services.database.tables import measurements as table
-from services.database.tables import tasks
 from services.stages.pictures import stem
+from services.stages.tasks import evaluated_from
 from services.store import MissingArtifact, Store
-from services.tasks import FACTS, Task
+from services.tasks import FACTS
 
 _MOST_ROWS = 5_000
 _MOST_LEVEL = 255
@@ -50,7 +50,7 @@ class Shot:
 
 @dataclass(frozen=True, slots=True)
 class SeenView:
-    """A view of the scene at the size that it was measured at last.
+    """A view of the scene as it was measured last.
 
     Attributes:
         name: Of the view.
@@ -88,6 +88,18 @@ class SeenView:
         return min(_MOST_LEVEL, max([shot.measured.k_max or 1 for shot in shots], default=1))
 
 
+def setting_of(data: Mapping[str, Any]) -> tuple[Any, ...]:
+    """What the latest measurement of a view's name shares with all that can be compared with it.
+
+    Two cameras may have the same name: sampled views and those of `--views` are numbered. The fragments that they see
+    tell them apart.
+
+    Args:
+        data: `schemas.measurement.Measurement` as JSON.
+    """
+    return data["width"], data["height"], data["alpha"], data["tail"], data["total_fragments"]
+
+
 def views(database: Database, digest: str) -> list[SeenView]:
     """Views of a scene that were measured, by name.
 
@@ -103,24 +115,22 @@ def views(database: Database, digest: str) -> list[SeenView]:
     for row in rows:
         shot = Shot(row.artifact, row.model, Measurement.model_validate(row.data))
         m = shot.measured
-        key = (m.width, m.height, m.alpha, m.tail)
-        # Other sizes, opacities and tails than the latest cannot be compared with it.
+        key = setting_of(row.data)
         if setting.setdefault(m.view, key) == key:
             found.setdefault(m.view, {}).setdefault((m.technique, m.budget_factor), shot)
     return [_view(name, list(found[name].values())) for name in sorted(found)]
 
 
-def certificates(database: Database, store: Store, view: SeenView) -> list[Certificate]:
+def certificates(store: Store, view: SeenView) -> list[Certificate]:
     """The certified optimum of a view at each budget; none where its labels are not kept any more."""
-    kept = {shot.artifact for shot in view.shots}
-    with database.read() as connection:
-        query = sa.select(tasks.c.task).where(tasks.c.artifact.in_(kept)).limit(2 * len(kept))
-        made = [Task.model_validate(task) for task in connection.scalars(query)]
-    for task in made:
-        label = next((need for need in task.needs if need.startswith("label/")), None)
-        facts = None if label is None else facts_of(store, label)
+    for artifact in sorted({shot.artifact for shot in view.shots}):
+        try:
+            made_from = store.made_from(artifact)
+        except MissingArtifact:
+            continue
+        facts = facts_of(store, evaluated_from(made_from.inputs)[1])
         if facts is not None:
-            shown = zip(task.params["factors"], facts["certificates"], strict=True)
+            shown = zip(made_from.params["factors"], facts["certificates"], strict=True)
             return [Certificate(scene="", view=view.name, budget_factor=f, **found) for f, found in shown]
     return []
 

@@ -69,7 +69,7 @@ def show_scene(
         factor=factor,
         comparison=measured.compare(everything, scene.name) if everything else None,
         models=sorted({shot.model for one in seen for shot in one.shots if shot.model}),
-        certificates=certificates(service.database, service.storage.store, shown) if shown else [],
+        certificates=certificates(service.storage.store, shown) if shown else [],
         **_pictures(service, scene_id, shown, factor),
     )
 

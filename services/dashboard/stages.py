@@ -2,24 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
 
 from schemas.job import FINAL_STATES
 from schemas.service import JobRecord, StageProgress
 from services.engine.progress import SHARES
-
-NEEDS: Final[Mapping[str, tuple[str, ...]]] = {
-    "scene": (),
-    "render": ("scene",),
-    "label": ("render",),
-    "train": ("label",),
-    "export": ("train",),
-    "evaluate": ("label", "export"),
-    "report": ("evaluate",),
-}
-"""Stage -> the stages whose artifacts it reads, as `services.steps` asks for them."""
+from services.tasks import STAGE_NEEDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +31,13 @@ class Node:
 def graph(job: JobRecord) -> list[Node]:
     """All stages of a job, each after those that it needs."""
     known = {progress.stage: progress for progress in job.stages}
-    order = [stage for stage in NEEDS if stage in SHARES[job.kind] or stage in known]
+    order = [stage for stage in STAGE_NEEDS if stage in SHARES[job.kind] or stage in known]
     if job.spec.dataset is not None:
         order = [stage for stage in order if stage in ("train", "export") or stage in known]
     return [
         Node(
             stage,
-            tuple(needed for needed in NEEDS[stage] if needed in order),
+            tuple(needed for needed in STAGE_NEEDS[stage] if needed in order),
             known.get(stage, StageProgress(stage=stage)),
             _state(known.get(stage), job.state),
         )

@@ -177,6 +177,38 @@ def history_chart(
     return _svg(frame, parts, what)
 
 
+def curve_chart(curve: Sequence[float], hull: Sequence[int], chosen: Mapping[int, Sequence[str]], what: str) -> str:
+    """The error curve of a pixel (squared error x1e-5, linear axes), its lower hull, and the k that were chosen.
+
+    Args:
+        curve: `e_p(k)` for k = 0..n.
+        hull: Vertices k of the hull; none if there is nothing to gain.
+        chosen: k -> who chose it.
+        what: What a screen reader says.
+
+    Returns:
+        SVG; '' if the pixel is exact for every k.
+    """
+    points = [(float(k), 1e5 * error) for k, error in enumerate(curve)]
+    top = max(y for _, y in points)
+    if top == 0.0:
+        return ""
+    n = len(points) - 1
+    frame = Frame((0.0, float(n)), (0.0, 1.05 * top), log_x=False, log_y=False, height=260.0)
+    ticks = [(k, f"{k:g}") for k in linear_ticks(0.0, float(n)) if k == int(k)]
+    parts = [_axes(frame, "core fragments k", "squared error ×1e-5", ticks)]
+    parts += [_line(frame, points, "line curve"), _line(frame, [points[k] for k in hull], "front")]
+    for k, who in sorted(chosen.items()):
+        x, y = frame.px(float(k)), frame.py(points[k][1])
+        told = f"k = {k}, {number(points[k][1])}e-5: {', '.join(who)}"
+        rule = f'<path class="exact" d="M{x:.1f} {frame.top}V{frame.height - frame.bottom}"/>'
+        dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="4.5"/>'
+        parts.append(f'<g class="mark">{rule}{dot}<title>{escape(told)}</title></g>')
+        letters = " ".join(name for name in who if len(name) == 1)
+        parts.append(_text("point", "start", x + 4, frame.top + 10, letters) if letters else "")
+    return _svg(frame, parts, what)
+
+
 def legend(techniques: Sequence[str]) -> str:
     """Marks and titles of techniques in a row, and what the dashed line and the numbers mean."""
     items = [_key(f"t-{t} mark", 18, _mark(t, 9, 9), title(t)) for t in technique_order(techniques)]

@@ -19,10 +19,9 @@ from support.dashboard import HOSTILE, ORIGIN, Shown, Visitor, fill
 from support.postgres import Postgres
 
 from services.api.routes import GUARDED, OPEN, routes
-from services.dashboard import OPEN_PAGES, PAGES, assets
+from services.dashboard import OPEN_PAGES, PAGES, SESSION_ANSWERS, assets
 from services.dashboard.page import duration, is_local
 from services.dashboard.sessions import form_token
-from services.dashboard.stages import NEEDS
 from services.database import Database, tables
 from services.engine.progress import SHARES
 
@@ -40,21 +39,6 @@ LISTS = ("/", "/jobs", "/models", "/scenes")
 
 
 @pytest.fixture(scope="module")
-def api(tmp_path_factory: pytest.TempPathFactory) -> Api:
-    return Api(tmp_path_factory.mktemp("full"), rate=1e6, burst=10**6, ttl=1e6)
-
-
-@pytest.fixture(scope="module")
-def shown(api: Api, tmp_path_factory: pytest.TempPathFactory) -> Shown:
-    return fill(api, tmp_path_factory.mktemp("bundles"))
-
-
-@pytest.fixture(scope="module")
-def empty(tmp_path_factory: pytest.TempPathFactory) -> Api:
-    return Api(tmp_path_factory.mktemp("empty"), rate=1e6, burst=10**6)
-
-
-@pytest.fixture(scope="module")
 def admin(api: Api) -> Visitor:
     return Visitor(api)
 
@@ -66,9 +50,11 @@ def _pages(shown: Shown) -> list[str]:
 
 def test_every_route_of_the_application_is_known(api: Api) -> None:
     """Nothing is reachable but what a test of this file or of the API's walks through."""
-    named = {(route.path, name) for route in routes((*GUARDED, *OPEN, *PAGES, *OPEN_PAGES)) for name in route.methods}
-    assert {route.path for route in routes(OPEN_PAGES)} == {"/sign-in", "/static/{digest}/{name}"}
-    assert api.app.state.routers == (*GUARDED, *OPEN, *PAGES, *OPEN_PAGES)
+    every = (*GUARDED, *OPEN, *PAGES, *SESSION_ANSWERS, *OPEN_PAGES)
+    named = {(route.path, name) for route in routes(every) for name in route.methods}
+    demo = {"/demo", "/demo/assets/{name}", "/demo/licences.md"}
+    assert {route.path for route in routes(OPEN_PAGES)} == {"/sign-in", "/static/{digest}/{name}", *demo}
+    assert api.app.state.routers == every
     assert [route for route in api.app.routes if isinstance(route, APIRoute)] == []
     assert len(named) == sum(len(route.methods or ()) for route in routes(api.app.state.routers))
 
@@ -222,6 +208,27 @@ def test_forms_do_what_they_say(tmp_path: Path) -> None:
     assert admin.post("/models/glass/rollback", alias="champion", reason="  ").status_code == 422
 
 
+def test_moves_of_aliases_name_the_key_that_made_them(tmp_path: Path) -> None:
+    api = Api(tmp_path / "state")
+    api.version(tmp_path / "bundle")
+    key, secret = api.service.keys.create("Ada's <laptop>", ["publish"])
+    visitor = Visitor(api, None)
+    visitor.sign_in(secret)
+    visitor.post("/models/glass/promote", version="1.0.0", alias="champion", reason="a look at it")
+    api.service.keys.revoke(key.id)
+    api.service.registry.promote("glass", "1.0.0", "by hand", "stable", who="root")
+    page = Visitor(api, "read").get("/models/glass").text
+    rows = re.findall(r"<tr><th[^>]*>(\w+)</th>.*?</time></td>(.*?)</tr>", page[page.index('id="aliases"') :])
+    cells = [
+        (alias, *(re.sub(r"<[^>]+>", "", cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", rest)))
+        for alias, rest in rows
+    ]
+    assert cells == [
+        ("stable", "root", "–", "1.0.0", "by hand"),
+        ("champion", f"Ada&#39;s &lt;laptop&gt; {key.id}", "–", "1.0.0", "a look at it"),
+    ]
+
+
 def test_buttons_are_there_for_those_who_may(api: Api, shown: Shown) -> None:
     for scope, submits, publishes in (("read", False, False), ("submit", True, False), ("publish", False, True)):
         visitor = Visitor(api, scope)
@@ -286,6 +293,90 @@ def test_what_does_not_exist_is_a_page_as_well(admin: Visitor) -> None:
     assert admin.get("/jobs?state=odd").status_code == 422
     assert admin.get("/jobs?cursor=odd").status_code == 422
     assert admin.client.put("/jobs").headers["allow"] == "GET"
+
+
+BROWSER = "text/html,application/xhtml+xml,application/xml;q=0.9,image/avif,image/webp,*/*;q=0.8"
+
+
+@pytest.mark.parametrize(
+    ("accept", "is_page"),
+    [
+        (BROWSER, True),
+        ("TEXT/HTML", True),
+        ("text/html, application/json", True),
+        ("text/html;q=0.5, application/json", False),
+        ("application/problem+json, text/html;q=0.9", False),
+        ("text/html;q=0", False),
+        ("text/html;q=nan", False),
+        ("text/html;q=a, */*", False),
+        ("application/json", False),
+        ("*/*", False),
+        ("", False),
+    ],
+)
+def test_an_address_that_leads_nowhere_is_a_page_for_a_browser_only(empty: Api, accept: str, is_page: bool) -> None:
+    nobody = Visitor(empty, None)
+    for path in ("/nowhere", "/jobs/", "/static/0000000000000000/none.css", "/%3Cscript%3E/%00%ff"):
+        answer = nobody.get(path, Accept=accept)
+        assert answer.status_code == 404
+        kind = "text/html; charset=utf-8" if is_page else "application/problem+json"
+        assert answer.headers["content-type"] == kind
+        if is_page:
+            assert "What to do: Check the address" in answer.text
+            assert answer.headers["content-security-policy"].startswith("default-src 'none'; script-src 'self'")
+            assert "<script>" not in answer.text
+            assert all(f'<a href="{place}">' in answer.text for place in LISTS)
+
+
+def test_addresses_of_the_api_answer_programs_whatever_they_accept(empty: Api) -> None:
+    for path in ("/v1", "/v1/", "/v1/nowhere", "/v1/jobs"):
+        answer = Visitor(empty, None).get(path, Accept=BROWSER)
+        assert answer.headers["content-type"] == "application/problem+json"
+
+
+def test_a_method_that_an_address_has_not_got(empty: Api) -> None:
+    nobody = Visitor(empty, None)
+    for path, allowed in (("/jobs/job_" + "0" * 24 + "/cancel", "POST"), ("/sign-out", "POST")):
+        answer = nobody.get(path, Accept=BROWSER)
+        assert (answer.status_code, answer.headers["allow"]) == (405, allowed)
+        assert "go back to its page" in answer.text
+        assert "Try again" not in answer.text
+    assert nobody.client.put("/jobs", headers={"Accept": "application/json"}).json()["status"] == 405
+
+
+def test_a_name_that_the_server_has_not_got_is_a_page_without_links_to_it(empty: Api) -> None:
+    answer = Visitor(empty, None).get("//evil.example/", Accept=BROWSER, Host="evil.example")
+    assert answer.status_code == 421
+    assert "Use the address that the server printed" in answer.text
+    assert "evil.example" not in answer.text
+
+
+def test_problem_pages_say_what_to_do_in_the_browser(tmp_path: Path) -> None:
+    api = Api(tmp_path, rate=0.01, burst=3)
+    visitor = Visitor(api, "read")
+    refused = visitor.post("/jobs/job_" + "0" * 24 + "/cancel")
+    assert refused.status_code == 403
+    assert "lacks the scope &#39;submit&#39;" in refused.text
+    assert "What to do: Sign out, and sign in with a key that has the scope" in refused.text
+    assert "Try again" not in refused.text
+    visitor.get("/jobs")
+    often = visitor.get("/jobs?state=failed")
+    assert often.status_code == 429
+    assert f"What to do: Wait {often.headers['retry-after']} seconds" in often.text
+    assert '<a href="/jobs?state=failed">Try again</a>' in often.text
+
+
+def test_a_fault_outside_the_pages_is_a_page_for_a_browser(empty: Api, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_: str) -> str:
+        raise RuntimeError("secret")
+
+    monkeypatch.setattr(assets, "address", fail)  # of a route that is no page
+    path = f"/static/{'0' * 16}/icon.svg"
+    answer = Visitor(empty, None).get(path, Accept=BROWSER)
+    assert (answer.status_code, answer.headers["content-type"]) == (500, "text/html; charset=utf-8")
+    assert "secret" not in answer.text
+    assert f'<a href="{path}">Try again</a>' in answer.text
+    assert Visitor(empty, None).get(path).json()["status"] == 500
 
 
 def test_a_database_that_fails_is_a_page_with_the_problem(
@@ -443,12 +534,6 @@ def test_streams_tell_of_changes(api: Api, shown: Shown) -> None:
     before = watch._look()
     api.log(shown.running, "news")
     assert watch._look() != before
-
-
-def test_stages_are_in_an_order_in_which_they_can_be_made() -> None:
-    order = list(NEEDS)
-    assert set(order) == set(SHARES["build"])
-    assert all(order.index(needed) < order.index(stage) for stage in order for needed in NEEDS[stage])
 
 
 def test_durations_and_addresses() -> None:

@@ -3,78 +3,62 @@
 from __future__ import annotations
 
 import os
-import shutil
 import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from sqlalchemy.exc import OperationalError
 from support.api import Api
-from support.dashboard import Shown, fill
+from support.browser import Tab
+from support.dashboard import Shown
 
-from services.database import tables
-
-playwright = pytest.importorskip("playwright.sync_api")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-
-SECONDS = 60_000
-"""Of patience with a busy machine, ms."""
+from services.database import Database, tables
 
 AUDIT = Path(__file__).with_name("dashboard_audit.js").read_text(encoding="utf-8").rstrip("\n;")
 """A function that returns what is wrong with a page for those who cannot see it, or not well."""
 
-
-@pytest.fixture(scope="module")
-def api(tmp_path_factory: pytest.TempPathFactory) -> Api:
-    return Api(tmp_path_factory.mktemp("service"), rate=1e6, burst=10**6, ttl=1e6)
+WINDOWS = [(1280, "light"), (360, "dark")]
+WINDOW_IDS = ["wide and light", "narrow and dark"]
 
 
-@pytest.fixture(scope="module")
-def shown(api: Api, tmp_path_factory: pytest.TempPathFactory) -> Shown:
-    return fill(api, tmp_path_factory.mktemp("bundles"))
-
-
-@pytest.fixture(scope="module")
-def url(api: Api) -> Iterator[str]:
-    with api.served() as address:
-        yield address
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as tools:
-        flags = ["--no-sandbox", "--disable-gpu"]
-        started = tools.chromium.launch(executable_path=CHROMIUM, args=flags, timeout=SECONDS)
-        yield started
-        started.close()
-
-
-class Tab:
-    """A signed-in tab that remembers what went wrong in it."""
-
-    def __init__(self, browser: Any, url: str, secret: str, width: int, scheme: str) -> None:
-        self.context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme, base_url=url)
-        self.page = self.context.new_page()
-        self.page.set_default_timeout(SECONDS)
-        self.faults: list[str] = []
-        self.page.on(
-            "console", lambda said: self.faults.append(said.text) if said.type in ("error", "warning") else None
-        )
-        self.page.on("pageerror", lambda error: self.faults.append(str(error)))
-        self.page.on("request", lambda sent: None if sent.url.startswith(url) else self.faults.append(sent.url))
-        self.page.goto("/jobs?state=failed")
-        self.page.get_by_label("API key").fill(secret)
-        self.page.keyboard.press("Enter")
-        self.page.wait_for_url("**/jobs?state=failed")
-
-
-@pytest.fixture(scope="module", params=[(1280, "light"), (360, "dark")], ids=["wide and light", "narrow and dark"])
-def tab(request: pytest.FixtureRequest, browser: Any, api: Api, url: str, shown: Shown) -> Iterator[Tab]:
-    opened = Tab(browser, url, api.secrets["admin"], *request.param)
+@pytest.fixture(scope="module", params=WINDOWS, ids=WINDOW_IDS)
+def tab(request: pytest.FixtureRequest, chromium: Any, api: Api, url: str, shown: Shown) -> Iterator[Tab]:
+    opened = Tab(chromium, url, *request.param)
+    opened.sign_in(api.secrets["admin"], "/jobs?state=failed")
     yield opened
     opened.context.close()
+
+
+@pytest.fixture(params=WINDOWS, ids=WINDOW_IDS)
+def empty_tab(request: pytest.FixtureRequest, chromium: Any, empty: Api) -> Iterator[Tab]:
+    with empty.served() as address:
+        opened = Tab(chromium, address, *request.param)
+        opened.sign_in(empty.secrets["admin"])
+        yield opened
+        opened.context.close()
+
+
+def _pages(shown: Shown) -> dict[str, str]:
+    return {
+        "overview": "/",
+        "jobs": "/jobs",
+        "job-running": f"/jobs/{shown.running}",
+        "job-failed": f"/jobs/{shown.failed}",
+        "job-built": f"/jobs/{shown.built}",
+        "models": "/models",
+        "model": "/models/glass",
+        "scenes": "/scenes",
+        "scene": f"/scenes/{shown.scene}",
+        "scene-rejected": f"/scenes/{shown.rejected}",
+    }
+
+
+def _require_clean(tab: Tab, place: str) -> None:
+    """Nothing that cannot be read, nothing too wide."""
+    assert tab.page.evaluate(AUDIT) == [], place
+    assert tab.page.evaluate("document.scrollingElement.scrollWidth") <= tab.page.viewport_size["width"], place
 
 
 def test_every_page_is_clean(tab: Tab, shown: Shown, tmp_path: Path) -> None:
@@ -85,24 +69,72 @@ def test_every_page_is_clean(tab: Tab, shown: Shown, tmp_path: Path) -> None:
     folder = Path(os.environ.get("DIAPHANE_SCREENSHOTS", tmp_path))
     folder.mkdir(parents=True, exist_ok=True)
     width = tab.page.viewport_size["width"]
-    places = {
-        "overview": "/",
-        "jobs": "/jobs",
-        "job-running": f"/jobs/{shown.running}",
-        "job-failed": f"/jobs/{shown.failed}",
-        "models": "/models",
-        "model": "/models/glass",
-        "scenes": "/scenes",
-        "scene": f"/scenes/{shown.scene}",
-        "sign-in": "/sign-in",
-    }
-    for name, place in places.items():
+    for name, place in (_pages(shown) | {"sign-in": "/sign-in", "nowhere": "/nowhere"}).items():
         tab.page.goto(place, wait_until="load")
-        assert tab.page.evaluate(AUDIT) == [], place
-        assert tab.page.evaluate("document.scrollingElement.scrollWidth") <= width, place
+        _require_clean(tab, place)
         tab.page.screenshot(path=folder / f"{name}-{width}.png", full_page=True)
         assert (folder / f"{name}-{width}.png").stat().st_size > 5000
-    assert tab.faults == []
+    assert _only_status(tab, 404)
+
+
+def test_pages_without_anything_to_show_say_what_to_do(empty_tab: Tab) -> None:
+    for place in ("/", "/jobs", "/models", "/scenes"):
+        empty_tab.page.goto(place, wait_until="load")
+        _require_clean(empty_tab, place)
+        assert "diaphane jobs submit build" in empty_tab.page.locator(".empty").first.inner_text()
+    assert empty_tab.faults == []
+
+
+def test_what_is_not_there_is_a_page_that_leads_on(tab: Tab) -> None:
+    for place in ("/nowhere", "/jobs/job_" + "0" * 24, "/models/nothing", "/scenes/scn_" + "0" * 32):
+        tab.page.goto(place)
+        _require_clean(tab, place)
+        assert "What to do:" in tab.page.locator(".problem").inner_text()
+    tab.page.locator("main").get_by_role("link", name="Models").click()
+    tab.page.wait_for_url("**/models")
+    assert _only_status(tab, 404)
+
+
+def test_pages_of_a_failing_service_say_so(tab: Tab, shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as broken:
+        broken.setattr(Database, "read", _fail)
+        for place in _pages(shown).values():
+            tab.page.goto(place)
+            _require_clean(tab, place)
+            assert "The database cannot be reached." in tab.page.locator(".problem").inner_text()
+    tab.page.get_by_role("link", name="Try again").click()
+    tab.page.get_by_role("heading", name="Facts").wait_for()
+    assert _only_status(tab, 503)
+
+
+def test_a_live_page_outlives_a_failing_database(
+    tab: Tab, api: Api, shown: Shown, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is on the page stays, it is said that it may be old, and what comes next is shown again."""
+    tab.page.goto(f"/jobs/{shown.running}")
+    with monkeypatch.context() as broken:
+        broken.setattr(Database, "read", _fail)
+        tab.page.evaluate("htmx.trigger(document.getElementById('job'), 'refresh')")
+        tab.page.get_by_role("alert").wait_for()
+        assert "the service answered 503" in tab.page.get_by_role("alert").inner_text()
+        assert tab.page.get_by_role("heading", name="Stages").is_visible()
+    text = f"again at {tab.page.viewport_size['width']}"
+    _go_on(api, shown.running, "label", text)
+    tab.page.get_by_text(text).wait_for()
+    tab.page.get_by_role("alert").wait_for(state="hidden")
+    assert _only_status(tab, 503)
+
+
+def _fail(_: object) -> None:
+    raise OperationalError("select 1", {}, Exception("gone"))
+
+
+def _only_status(tab: Tab, status: int) -> bool:
+    """Whether all that the console said is that an answer had this status; forgets it."""
+    said = [fault for fault in tab.faults if f"the server responded with a status of {status}" not in fault]
+    said = [fault for fault in said if not fault.startswith(f"Response Status Error Code {status}")]  # htmx
+    tab.faults.clear()
+    return said == []
 
 
 def test_a_running_job_is_shown_as_it_goes(tab: Tab, api: Api, shown: Shown) -> None:
@@ -125,11 +157,19 @@ def test_the_overview_goes_along(tab: Tab, api: Api, shown: Shown) -> None:
     tab.page.goto("/")
     loads: list[str] = []
     tab.page.on("framenavigated", lambda frame: loads.append(frame.url))
+    _name(api, shown.built, "glass-too")
     _go_on(api, shown.running, "evaluate", "on")
     tab.page.locator("#now").get_by_text("evaluate").wait_for()
+    tab.page.locator("#ended-now").get_by_text("build glass-too").wait_for()
     assert loads == []
+    _name(api, shown.built, "glass")
     _go_on(api, shown.running, "label", "back again")
     assert tab.faults == []
+
+
+def _name(api: Api, job_id: str, name: str) -> None:
+    with api.service.database.write() as connection:
+        connection.execute(tables.jobs.update().where(tables.jobs.c.id == job_id).values(name=name))
 
 
 def _go_on(api: Api, job_id: str, stage: str, text: str) -> None:

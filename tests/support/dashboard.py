@@ -68,17 +68,23 @@ class Shown:
     rejected: str
 
 
-def fill(api: Api, folder: Path) -> Shown:
-    """Writes through the service's own classes and tables what workers would have written."""
+def fill(api: Api, folder: Path, said: str = HOSTILE) -> Shown:
+    """Writes through the service's own classes and tables what workers would have written.
+
+    Args:
+        api: The service.
+        folder: For bundles.
+        said: What those who use it write wherever they may write anything.
+    """
     made = Shown()
-    made.scene, made.rejected = _scenes(api)
+    made.scene, made.rejected = _scenes(api, said)
     evaluate = _evaluation(api)
     made.running = _job(api, made.scene, "running", stage="label", started=time.time() - 90.0)
     _task(api, made.running, "render", "bottles front", "skipped", 0)
-    _task(api, made.running, "label", f"bottles {HOSTILE}", "running", 1, progress=0.4, note=HOSTILE)
-    problem = ProblemDocument(type="/v1/problems/check-failed", title="A check failed.", status=422, detail=HOSTILE)
+    _task(api, made.running, "label", f"bottles {said}", "running", 1, progress=0.4, note=said)
+    problem = ProblemDocument(type="/v1/problems/check-failed", title="A check failed.", status=422, detail=said)
     _task(api, made.running, "label", "bottles side", "quarantined", 2, problem=problem.model_dump(mode="json"))
-    api.log(made.running, "a line", HOSTILE)
+    api.log(made.running, "a line", said)
     remedial = problem.model_copy(update={"remedy": "Add scenes."}).model_dump(mode="json")
     made.failed = _job(api, made.scene, "failed", problem=remedial, finished=time.time())
     report = api.service.storage.blobs.put_bytes(b"<!doctype html><title>Report</title><script>1</script>").sha256
@@ -86,7 +92,7 @@ def fill(api: Api, folder: Path) -> Shown:
     made.built = _job(api, made.scene, "succeeded", result=result, finished=time.time(), skipped={"views captured": 3})
     _task(api, made.built, "render", "bottles front", "done", 0, seconds=75.0)
     _task(api, made.built, "evaluate", "bottles front", "done", 1, task=evaluate)
-    _models(api, folder, evaluate, api.service.scenes.get(made.scene).digest)
+    _models(api, folder, evaluate, api.service.scenes.get(made.scene).digest, said)
     with api.service.database.write() as connection:
         row = {
             "id": "e",
@@ -100,11 +106,11 @@ def fill(api: Api, folder: Path) -> Shown:
     return made
 
 
-def _scenes(api: Api) -> tuple[str, str]:
+def _scenes(api: Api, said: str) -> tuple[str, str]:
     accepted = api.scene()
     with api.service.database.write() as connection:
-        facts = {"triangles": 1234567, "cameras": 2, "opaque": False, "warnings": [HOSTILE]}
-        connection.execute(tables.scenes.update().values(name=HOSTILE, facts=facts))
+        facts = {"triangles": 1234567, "cameras": 2, "opaque": False, "warnings": [said]}
+        connection.execute(tables.scenes.update().values(name=said, facts=facts))
     sha256 = api.service.storage.blobs.put_bytes(b"#usda 1.0\n# other\n").sha256
     record, _ = api.service.scenes.create("other", "scene.usda", {"scene.usda": sha256}, "key_000000000000")
     problem = ProblemDocument(
@@ -138,7 +144,11 @@ def _evaluation(api: Api) -> Task:
     with api.service.storage.store.put(label.address) as folder:
         save_facts(folder, {"certificates": [{"error": 0.25, "bound": 0.2, "gap": 0.2}]})
     task = Task(
-        name="bottles front", stage="evaluate", version="v1", needs=(label.artifact,), params={"factors": [1.0]}
+        name="bottles front",
+        stage="evaluate",
+        version="v1",
+        inputs=("0" * 64, label.address.key),
+        params={"factors": [1.0]},
     )
     counts = np.arange(SIZE[0] * SIZE[1], dtype=np.uint8).reshape(SIZE[1], SIZE[0])
     with api.service.storage.store.put(task.address) as folder:
@@ -148,12 +158,12 @@ def _evaluation(api: Api) -> Task:
     return task
 
 
-def _models(api: Api, folder: Path, evaluate: Task, digest: str) -> None:
+def _models(api: Api, folder: Path, evaluate: Task, digest: str, said: str) -> None:
     registry, measured = api.service.registry, api.service.measured
     for number, weights in enumerate("abc"):
         registry.publish("glass", make_bundle(folder / weights, weights), 0.5 + 0.1 * number, {"views": ["a"]})
-        registry.promote("glass", f"1.{number}.0", f"{HOSTILE} {number}", who="key_000000000000")
-    digests = {"bottles": digest, HOSTILE: "1" * 64}
+        registry.promote("glass", f"1.{number}.0", f"{said} {number}", who="key_000000000000")
+    digests = {"bottles": digest, said: "1" * 64}
     size = {"width": SIZE[0], "height": SIZE[1], "k_min": 1, "k_max": 9, "total_bytes": 1 << 20}
     times = {"kbuffer": (4e-4, 2.0), "kbuffer-importance": (3e-4, 3.0), "kbuffer-optimal": (1e-4, 9.0)}
     base = [measurement(technique=name, mse=mse, total_ms=ms, **size) for name, (mse, ms) in times.items()]
@@ -161,5 +171,5 @@ def _models(api: Api, folder: Path, evaluate: Task, digest: str) -> None:
     measured.record(evaluate.artifact, base, digests, None, None)
     for number, factor in enumerate((1.0, 1.2, 1.01)):  # the second is worse on one scene
         own = [measurement(technique="kbuffer-deep", mse=2e-4 * factor, total_ms=4.0, **size)]
-        own.append(measurement(technique="kbuffer-deep", mse=2e-4, total_ms=4.0, scene=HOSTILE, **size))
+        own.append(measurement(technique="kbuffer-deep", mse=2e-4, total_ms=4.0, scene=said, **size))
         measured.record(f"evaluate/{number:064x}", own, digests, f"glass@1.{number}.0", None)

@@ -11,6 +11,7 @@ function follow(box) {
   let source = null;
   let last = "";
   let due = 0;
+  let again = 0;
   const changed = (event) => {
     last = event.lastEventId || last;
     due ||= setTimeout(() => {
@@ -23,8 +24,14 @@ function follow(box) {
     if (last) url.searchParams.set("after", last);
     source = new EventSource(url);
     for (const kind of ["change", "state", "stage", "task", "log"]) source.addEventListener(kind, changed);
+    // A browser gives up on a stream that was refused: for good if all has been told, else only for now.
+    source.addEventListener("error", () => {
+      const isLive = document.getElementById(box.dataset.part).dataset.live !== undefined;
+      if (source.readyState === EventSource.CLOSED && isLive) again = setTimeout(open, 5000);
+    });
   };
   document.addEventListener("visibilitychange", () => {
+    clearTimeout(again);
     source?.close();
     if (!document.hidden) open();
   });

@@ -1,0 +1,46 @@
+"""Fixtures of the dashboard's tests: services with something of everything and with nothing, and a browser."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from support.api import Api
+from support.browser import CHROMIUM, browser
+from support.dashboard import Shown, fill
+
+
+@pytest.fixture(scope="module")
+def api(tmp_path_factory: pytest.TempPathFactory) -> Api:
+    """A service that `shown` fills."""
+    return Api(tmp_path_factory.mktemp("full"), rate=1e6, burst=10**6, ttl=1e6)
+
+
+@pytest.fixture(scope="module")
+def shown(api: Api, tmp_path_factory: pytest.TempPathFactory) -> Shown:
+    """What is in it."""
+    return fill(api, tmp_path_factory.mktemp("bundles"))
+
+
+@pytest.fixture(scope="module")
+def empty(tmp_path_factory: pytest.TempPathFactory) -> Api:
+    """A service without anything but keys."""
+    return Api(tmp_path_factory.mktemp("empty"), rate=1e6, burst=10**6)
+
+
+@pytest.fixture(scope="module")
+def url(api: Api) -> Iterator[str]:
+    """Where `api` is served."""
+    with api.served() as address:
+        yield address
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A headless browser."""
+    pytest.importorskip("playwright.sync_api")
+    if CHROMIUM is None:
+        pytest.skip("chromium is not installed")
+    with browser(tmp_path_factory.mktemp("browser")) as started:
+        yield started

@@ -1,0 +1,113 @@
+"""A headless browser that sees two fonts only, and signed-in tabs of it that remember what went wrong."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+MILLISECONDS = 60_000
+"""Of patience with a busy machine."""
+
+FONTS = ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf", "DejaVuSansMono.ttf", "DejaVuSansMono-Bold.ttf")
+"""Those that the style sheet falls back to; Debian has them in `fonts-dejavu-core`."""
+FONT_FOLDERS = (Path("/usr/share/fonts"), Path("/usr/local/share/fonts"))
+
+WEBGPU = (
+    *("--no-sandbox", "--ignore-gpu-blocklist", "--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader"),
+    *("--enable-features=Vulkan", "--use-vulkan=swiftshader", "--use-angle=vulkan"),  # else no canvas can be shown
+)
+"""Flags with which it has WebGPU, in software."""
+
+_FLAGS = ("--no-sandbox", "--disable-gpu", "--disable-lcd-text", "--force-color-profile=srgb")
+_FONTS_CONF = """<?xml version="1.0"?>
+<!DOCTYPE fontconfig SYSTEM "fonts.dtd">
+<fontconfig>
+{folders}
+<cachedir>{cache}</cachedir>
+<selectfont><acceptfont>{accepted}</acceptfont><rejectfont><glob>*.*</glob></rejectfont></selectfont>
+<alias><family>monospace</family><prefer><family>DejaVu Sans Mono</family></prefer></alias>
+<alias><family>sans-serif</family><prefer><family>DejaVu Sans</family></prefer></alias>
+<alias><family>system-ui</family><prefer><family>DejaVu Sans</family></prefer></alias>
+<match target="font">
+<edit name="antialias" mode="assign"><bool>true</bool></edit>
+<edit name="hinting" mode="assign"><bool>false</bool></edit>
+<edit name="rgba" mode="assign"><const>none</const></edit>
+</match>
+</fontconfig>
+"""
+
+
+def font_files() -> list[Path]:
+    """The files of `FONTS` that are installed."""
+    found = {path.name: path for folder in FONT_FOLDERS for path in folder.rglob("DejaVuSans*.ttf")}
+    return [found[name] for name in FONTS if name in found]
+
+
+@contextmanager
+def browser(folder: Path, flags: Sequence[str] = _FLAGS) -> Iterator[Any]:
+    """Chromium, whose pages look the same whichever fonts are installed beside `FONTS`.
+
+    Args:
+        folder: For what fontconfig is told, and its cache.
+        flags: Of its command line.
+    """
+    from playwright.sync_api import sync_playwright
+
+    told = folder / "fonts.conf"
+    told.write_text(
+        _FONTS_CONF.format(
+            folders="".join(f"<dir>{path}</dir>" for path in FONT_FOLDERS),
+            cache=folder / "fonts",
+            accepted="".join(f"<glob>*/{name}</glob>" for name in FONTS),
+        ),
+        encoding="utf-8",
+    )
+    with sync_playwright() as tools:
+        started = tools.chromium.launch(
+            executable_path=CHROMIUM,
+            args=list(flags),
+            env={**os.environ, "FONTCONFIG_FILE": str(told)},
+            timeout=MILLISECONDS,
+        )
+        try:
+            yield started
+        finally:
+            started.close()
+
+
+class Tab:
+    """A tab that remembers what went wrong in it.
+
+    Args:
+        browser: The browser.
+        url: Of the service.
+        width: Of the window, CSS pixels.
+        scheme: `light` or `dark`.
+
+    Attributes:
+        scheme: Of its colours.
+        faults: Errors and warnings of the console, uncaught errors, and requests that went elsewhere.
+    """
+
+    def __init__(self, browser: Any, url: str, width: int, scheme: str) -> None:
+        self.context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme, base_url=url)
+        self.page = self.context.new_page()
+        self.page.set_default_timeout(MILLISECONDS)
+        self.scheme, self.faults = scheme, list[str]()
+        self.page.on(
+            "console", lambda said: self.faults.append(said.text) if said.type in ("error", "warning") else None
+        )
+        self.page.on("pageerror", lambda error: self.faults.append(str(error)))
+        self.page.on("request", lambda sent: None if sent.url.startswith(url) else self.faults.append(sent.url))
+
+    def sign_in(self, secret: str, to: str = "/") -> None:
+        """Asks for a page, and signs in where that leads to."""
+        self.page.goto(to)
+        self.page.get_by_label("API key").fill(secret)
+        self.page.keyboard.press("Enter")
+        self.page.wait_for_url(f"**{to}")
