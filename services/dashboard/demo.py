@@ -13,10 +13,12 @@ from typing import Annotated, Final
 
 from fastapi import APIRouter, Request, Response
 from fastapi import Path as InPath
+from fastapi.responses import JSONResponse
 
 from services.api import blobs, models
 from services.api.etags import is_current
 from services.dashboard.page import HEADERS
+from services.dashboard.visitor import COOKIE
 from services.problems import Refusal
 
 BUILT: Final = Path(__file__).resolve().parent / "static" / "demo"
@@ -62,6 +64,15 @@ async def read_demo_asset(
 async def read_demo_licences(request: Request) -> Response:
     """Of what the script contains of others."""
     return _answer(request, "licences.md", {"Cache-Control": "no-cache"})
+
+
+@open_router.get("/session", response_class=JSONResponse)
+async def show_session(request: Request) -> JSONResponse:
+    """Whether the browser sends a session; the page asks before it asks for models, where a refusal would be an error.
+
+    The session may have ended: then the registry refuses. So this needs no look at the database.
+    """
+    return JSONResponse({"signed_in": bool(request.cookies.get(COOKIE))}, headers={"Cache-Control": "no-store"})
 
 
 def _answer(request: Request, name: str, headers: dict[str, str]) -> Response:

@@ -52,7 +52,7 @@ def test_every_route_of_the_application_is_known(api: Api) -> None:
     """Nothing is reachable but what a test of this file or of the API's walks through."""
     every = (*GUARDED, *OPEN, *PAGES, *SESSION_ANSWERS, *OPEN_PAGES)
     named = {(route.path, name) for route in routes(every) for name in route.methods}
-    demo = {"/demo", "/demo/assets/{name}", "/demo/licences.md"}
+    demo = {"/demo", "/demo/assets/{name}", "/demo/licences.md", "/demo/session"}
     assert {route.path for route in routes(OPEN_PAGES)} == {"/sign-in", "/static/{digest}/{name}", *demo}
     assert api.app.state.routers == every
     assert [route for route in api.app.routes if isinstance(route, APIRoute)] == []

@@ -8,6 +8,9 @@ import { Trouble } from "./trouble";
 import { type Batch, type Image, type Layer, type Scene, encodeGamma2, orient } from "./scene";
 
 const MOST_VERTICES = 4_000_000;
+const MOST_CORNERS = 6 * MOST_VERTICES;
+/** Of all accessors: those without data, or with the same, take no room in a file. */
+const MOST_ELEMENTS = 32_000_000;
 const MOST_BYTES = 256 * 2 ** 20;
 const TRIANGLES = 4;
 const STRIP = 5;
@@ -54,12 +57,16 @@ export async function readGlb(name: string, bytes: Uint8Array<ArrayBuffer>): Pro
   if (bytes.byteLength > MOST_BYTES) {
     throw new Trouble(`${name} is larger than ${MOST_BYTES / 2 ** 20} MiB.`, "Open a smaller file.");
   }
-  const placed = await place(await parse(name, bytes));
-  const vertices = placed.reduce((sum, one) => sum + one.points.length, 0);
-  if (vertices === 0)
-    throw new Trouble(`${name} has nothing to draw.`, "Check that it has meshes of triangles in a scene.");
-  if (vertices > MOST_VERTICES) throw new Trouble(`${name} has ${vertices} vertices.`, "Open a smaller file.");
-  return assemble(name, placed);
+  try {
+    const placed = await place(name, await parse(name, bytes));
+    if (placed.every((one) => one.mesh.corners.length === 0))
+      throw new Trouble(`${name} has nothing to draw.`, "Check that it has meshes of triangles in a scene.");
+    return assemble(name, placed);
+  } catch (error) {
+    // Of the stack or of an array's length: nodes in nodes in nodes, or too many of something.
+    if (!(error instanceof RangeError)) throw error;
+    throw new Trouble(`${name} is too deep or too large.`, "Open a simpler file.");
+  }
 }
 
 async function parse(name: string, bytes: Uint8Array<ArrayBuffer>): Promise<Document> {
@@ -71,6 +78,8 @@ async function parse(name: string, bytes: Uint8Array<ArrayBuffer>): Promise<Docu
       throw new Trouble(`${name} needs ${unknown.join(", ")}, which is not supported here.`, "Export it without.");
     }
     json.json.extensionsRequired = [];
+    const elements = (json.json.accessors ?? []).reduce((sum, { count }) => sum + count, 0);
+    if (elements > MOST_ELEMENTS) throw tooLarge(name, elements, "elements of attributes and indices");
     return await io.readJSON(json);
   } catch (error) {
     if (error instanceof Trouble) throw error;
@@ -81,26 +90,37 @@ async function parse(name: string, bytes: Uint8Array<ArrayBuffer>): Promise<Docu
   }
 }
 
-async function place(document: Document): Promise<Placed[]> {
+const tooLarge = (name: string, count: number, what: string): Trouble =>
+  new Trouble(`${name} has ${count.toLocaleString("en")} ${what} or more.`, "Open a smaller file.");
+
+async function place(name: string, document: Document): Promise<Placed[]> {
   const root = document.getRoot();
   const shown = root.getDefaultScene() ?? root.listScenes()[0];
-  const looks = new Map<Material | null, Promise<Look>>();
+  const looks = new Map<Material | null, Look>();
   const meshes = new Map<Primitive, Mesh>();
-  const waiting: { primitive: Primitive; matrix: readonly number[]; look: Promise<Look> }[] = [];
+  const waiting: { primitive: Primitive; matrix: readonly number[] }[] = [];
   shown?.traverse((node) => {
+    const primitives = node.getMesh()?.listPrimitives() ?? [];
+    if (primitives.length === 0) return;
     const matrix = node.getWorldMatrix();
-    for (const primitive of node.getMesh()?.listPrimitives() ?? []) {
+    for (const primitive of primitives) {
       if (![TRIANGLES, STRIP, FAN].includes(primitive.getMode()) || !primitive.getAttribute("POSITION")) continue;
-      const material = primitive.getMaterial();
-      if (!looks.has(material)) looks.set(material, lookOf(material));
-      waiting.push({ primitive, matrix, look: looks.get(material)! });
+      waiting.push({ primitive, matrix });
     }
   });
   const placed: Placed[] = [];
-  for (const { primitive, matrix, look: promised } of waiting) {
-    const look = await promised;
+  let [vertices, corners] = [0, 0];
+  for (const { primitive, matrix } of waiting) {
+    const material = primitive.getMaterial();
+    if (!looks.has(material)) looks.set(material, await lookOf(name, material));
+    const look = looks.get(material)!;
     if (!meshes.has(primitive)) meshes.set(primitive, meshOf(primitive, look.uv));
     const mesh = meshes.get(primitive)!;
+    // Counted as they are placed: many nodes may have one mesh.
+    vertices += mesh.points.length;
+    corners += mesh.corners.length;
+    if (vertices > MOST_VERTICES) throw tooLarge(name, vertices, "vertices");
+    if (corners > MOST_CORNERS) throw tooLarge(name, corners / 3, "triangles");
     const rows = cofactors(matrix);
     const turn = (v: Vec3): Vec3 =>
       unit([0, 1, 2].map((c) => rows[0][c]! * v[0] + rows[1][c]! * v[1] + rows[2][c]! * v[2]) as unknown as Vec3);
@@ -114,11 +134,11 @@ async function place(document: Document): Promise<Placed[]> {
   return placed;
 }
 
-async function lookOf(material: Material | null): Promise<Look> {
+async function lookOf(name: string, material: Material | null): Promise<Look> {
   const mode = material?.getAlphaMode() ?? "OPAQUE";
   const factor = (material?.getBaseColorFactor() ?? [1, 1, 1, 1]).map((x) => Math.min(Math.max(x, 0), 1));
   const scale = factor as unknown as Look["scale"];
-  const image = material ? await imageOf(material) : null;
+  const image = material ? await imageOf(name, material) : null;
   const threshold = mode === "MASK" ? (material?.getAlphaCutoff() ?? 0.5) : 0;
   const alpha = Math.floor(scale[3] * 255 + 0.5);
   let layer: Layer = image || mode === "MASK" || alpha === 255 ? "mixed" : "transparent";
@@ -129,12 +149,17 @@ async function lookOf(material: Material | null): Promise<Look> {
   return { layer, image, scale: image ? scale : white, threshold, base: image ? white : scale, uv };
 }
 
-async function imageOf(material: Material): Promise<Image | null> {
+async function imageOf(name: string, material: Material): Promise<Image | null> {
   const texture = material.getBaseColorTexture();
   const content = texture?.getImage();
   if (!texture || !content) return null;
   const blob = new Blob([content as Uint8Array<ArrayBuffer>], { type: texture.getMimeType() });
-  const pixels = await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+  let pixels: ImageBitmap;
+  try {
+    pixels = await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+  } catch {
+    throw new Trouble(`An image in ${name} cannot be read.`, "Export it with PNG or JPEG images.");
+  }
   const info = material.getBaseColorTextureInfo();
   const wrap = [info?.getWrapS(), info?.getWrapT()].map((each) => WRAPS[each ?? 10497] ?? "repeat");
   return { pixels, wrap: wrap as unknown as Image["wrap"] };
@@ -216,14 +241,21 @@ function fill(
   placed: readonly Placed[],
   origin: Vec3,
 ): Batch[] {
-  const looks = [...new Set(placed.map((one) => one.look))].sort((a, b) => order(a) - order(b));
+  // Without an image the colour is in the vertices: materials that differ in nothing else are drawn together.
+  const groups = new Map<Look | string, [Placed, ...Placed[]]>();
+  for (const one of placed) {
+    const key = one.look.image ? one.look : `${one.look.layer} ${one.look.threshold}`;
+    const group = groups.get(key);
+    if (group) group.push(one);
+    else groups.set(key, [one]);
+  }
   const batches: Batch[] = [];
   let vertex = 0;
   let index = 0;
-  for (const look of looks) {
+  for (const group of [...groups.values()].sort((a, b) => order(a[0].look) - order(b[0].look))) {
     const first = index;
-    const stored = [...look.base.slice(0, 3).map(encodeGamma2), Math.floor(look.base[3] * 255 + 0.5)];
-    for (const { points, normals, mesh } of placed.filter((one) => one.look === look)) {
+    for (const { points, normals, mesh, look } of group) {
+      const stored = [...look.base.slice(0, 3).map(encodeGamma2), Math.floor(look.base[3] * 255 + 0.5)];
       for (const corner of mesh.corners) scene.indices[index++] = vertex + corner;
       points.forEach((point, i) => {
         scene.positions.set(subtract(point, origin), 3 * vertex);
@@ -233,7 +265,7 @@ function fill(
         ++vertex;
       });
     }
-    const { layer, image, scale, threshold } = look;
+    const { layer, image, scale, threshold } = group[0].look;
     batches.push({ first, count: index - first, layer, image, scale, threshold });
   }
   return batches.filter((batch) => batch.count > 0);

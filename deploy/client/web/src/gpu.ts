@@ -67,20 +67,19 @@ export class Gpu {
   words(count: number): GPUBuffer {
     const size = 4 * Math.max(count, 1);
     const { maxStorageBufferBindingSize, maxBufferSize } = this.device.limits;
-    const most = Math.min(maxStorageBufferBindingSize, maxBufferSize);
-    if (size > most) {
-      throw new Trouble(
-        `A buffer of ${Math.ceil(size / 2 ** 20)} MiB is above this device's limit, ${Math.floor(most / 2 ** 20)} MiB.`,
-        "Make the window smaller, or the budget.",
-      );
-    }
+    fits(size, Math.min(maxStorageBufferBindingSize, maxBufferSize), "Make the window smaller, or the budget.");
     const { STORAGE, COPY_SRC, COPY_DST } = GPUBufferUsage;
     return this.device.createBuffer({ size, usage: STORAGE | COPY_SRC | COPY_DST });
   }
 
-  /** A buffer with a content. */
+  /**
+   * A buffer with a content.
+   *
+   * @throws Trouble It would be larger than the device allows.
+   */
   filled(data: ArrayBufferView<ArrayBuffer>, usage: GPUBufferUsageFlags): GPUBuffer {
     const size = Math.ceil(Math.max(data.byteLength, 4) / 4) * 4;
+    fits(size, this.device.limits.maxBufferSize, "Open a smaller scene.");
     const buffer = this.device.createBuffer({ size, usage: usage | GPUBufferUsage.COPY_DST, mappedAtCreation: true });
     const bytes = new Uint8Array(data.buffer, data.byteOffset, data.byteLength);
     new Uint8Array(buffer.getMappedRange()).set(bytes);
@@ -121,6 +120,12 @@ export class Gpu {
     staging.destroy();
     return words;
   }
+}
+
+function fits(size: number, most: number, remedy: string): void {
+  if (size <= most) return;
+  const [needed, allowed] = [Math.ceil(size / 2 ** 20), Math.floor(most / 2 ** 20)];
+  throw new Trouble(`A buffer of ${needed} MiB is above this device's limit, ${allowed} MiB.`, remedy);
 }
 
 export function entriesOf(resources: readonly Resource[]): GPUBindGroupEntry[] {

@@ -6,12 +6,12 @@ import type { View } from "./camera";
 import { Gpu } from "./gpu";
 import { readGlb } from "./gltf";
 import { attach } from "./hands";
-import { at, fill, say, show } from "./page";
+import { at, busy, fill, say, show } from "./page";
 import { selfTest } from "./passes/network";
 import type { Mode } from "./passes/screen";
-import { Registry, SignedOut } from "./registry";
+import { type Memory, Registry, SignedOut } from "./registry";
 import { TECHNIQUES, type Technique } from "./renderer";
-import { Stage } from "./stage";
+import { type Report, Stage } from "./stage";
 import { Trouble } from "./trouble";
 
 const SAMPLES = { "glass shells": shells, "a shelf of bottles": shelf };
@@ -27,15 +27,33 @@ const LEGENDS: Readonly<Record<Mode, string>> = {
   error: "largest difference of red, green and blue: 0 to 32 of 255 and more",
 };
 
-const registry = new Registry(localStorage);
+const registry = new Registry(memory());
 const select = (id: string): HTMLSelectElement => at<HTMLSelectElement>(id);
 
+/** What is kept between visits; where the browser is told to keep nothing, between models. */
+function memory(): Memory {
+  try {
+    return localStorage;
+  } catch {
+    const kept = new Map<string, string>();
+    return {
+      getItem: (name) => kept.get(name) ?? null,
+      setItem: (name, value) => void kept.set(name, value),
+      removeItem: (name) => void kept.delete(name),
+    };
+  }
+}
+
 async function start(): Promise<void> {
-  const stage = new Stage(await Gpu.open(), at<HTMLCanvasElement>("canvas"), show, say);
-  stage.gpu.device.addEventListener("uncapturederror", (event) => say(event.error));
-  void stage.gpu.device.lost.then(() => {
-    const remedy = "Load the page again; if it stays so, update the browser and the graphics driver.";
-    say(new Trouble("The graphics device was lost.", remedy));
+  const drawn = (report: Report): void => {
+    say("picture", null);
+    show(report);
+  };
+  const stage = new Stage(await Gpu.open(), at<HTMLCanvasElement>("canvas"), drawn, (error) => say("picture", error));
+  stage.gpu.device.addEventListener("uncapturederror", ({ error }) => {
+    const remedy = "Make the window or the budget smaller, or open a smaller scene; then load the page again.";
+    const isFull = error instanceof GPUOutOfMemoryError;
+    say("device", isFull ? new Trouble("The graphics device has no memory left.", remedy) : error);
   });
   fill(
     select("scene"),
@@ -83,31 +101,21 @@ function listen(stage: Stage): void {
   setBudget(stage);
 }
 
-/** Does something that takes a while, says so, and says what went wrong. */
-async function busy(text: string, work: () => Promise<void>): Promise<void> {
-  at("status").textContent = text;
-  try {
-    await work();
-    say(null);
-  } catch (error) {
-    say(error);
-  } finally {
-    at("status").textContent = "";
-  }
-}
-
 const openSample = (stage: Stage): Promise<void> =>
-  busy("The scene is loading.", async () => {
+  busy("scene", "The scene is loading.", async (isWanted) => {
     const name = select("scene").value as keyof typeof SAMPLES;
     const answer = await fetch(SAMPLES[name]);
     if (!answer.ok) throw new Trouble("The sample cannot be loaded.", "Load the page again.");
-    await stage.open(await readGlb(name, new Uint8Array(await answer.arrayBuffer())));
+    const scene = await readGlb(name, new Uint8Array(await answer.arrayBuffer()));
+    if (isWanted()) await stage.open(scene);
   });
 
 async function openFile(stage: Stage, file: File | undefined): Promise<void> {
   if (!file) return;
-  await busy("The file is read.", async () => {
-    await stage.open(await readGlb(file.name, new Uint8Array(await file.arrayBuffer())));
+  await busy("scene", "The file is read.", async (isWanted) => {
+    const scene = await readGlb(file.name, new Uint8Array(await file.arrayBuffer()));
+    if (!isWanted()) return;
+    await stage.open(scene);
     if (!Array.from(select("scene").options).some((option) => option.value === "")) {
       select("scene").prepend(new Option("", ""));
     }
@@ -183,10 +191,12 @@ async function loadModel(stage: Stage): Promise<void> {
   const note = at("model-note");
   note.textContent = "";
   stage.bundle = null;
-  if (name && selector) {
-    await busy("The model is fetched.", async () => {
+  if (!name || !selector) await busy("model", "", async () => {}); // what is still being fetched is not wanted
+  else {
+    await busy("model", "The model is fetched.", async (isWanted) => {
       const bundle = await registry.pull(name, selector);
       await selfTest(stage.gpu, bundle);
+      if (!isWanted()) return;
       stage.bundle = bundle;
       const signed = bundle.isSigned
         ? "signature and hashes are right"
@@ -198,7 +208,7 @@ async function loadModel(stage: Stage): Promise<void> {
 }
 
 start().catch((error: unknown) => {
-  say(error);
+  say("device", error);
   at("status").textContent = "There is nothing to see without WebGPU.";
   for (const control of document.querySelectorAll<HTMLInputElement>("#controls input, #controls select")) {
     control.disabled = true;

@@ -9,16 +9,49 @@ export function at<E extends HTMLElement>(id: string): E {
   return document.getElementById(id) as E;
 }
 
-/** Says what is wrong; null: nothing any more. */
-export function say(error: unknown): void {
-  const place = at("trouble");
-  place.hidden = error === null;
-  if (error === null) place.textContent = "";
-  else if (error instanceof Trouble) place.textContent = error.message;
+/** What something can be wrong with. */
+export type Matter = "device" | "scene" | "model" | "picture";
+
+const troubles = new Map<Matter, string>();
+
+/** Says what is wrong with a matter; null: nothing any more. */
+export function say(matter: Matter, error: unknown): void {
+  if (error === null) {
+    if (!troubles.delete(matter)) return;
+  } else if (error instanceof Trouble) troubles.set(matter, error.message);
   else {
-    place.textContent = "Something went wrong. Load the page again; the browser's console has the details.";
+    troubles.set(matter, "Something went wrong. Load the page again; the browser's console has the details.");
     console.error(error);
   }
+  const place = at("trouble");
+  place.textContent = [...new Set(troubles.values())].join("\n");
+  place.hidden = troubles.size === 0;
+}
+
+const waits = new Map<Matter, string>();
+const turns: Partial<Record<Matter, number>> = {};
+
+/**
+ * Does something that takes a while, says so, and says what went wrong.
+ *
+ * @param work Is told whether it is still wanted: whoever asks again has changed their mind.
+ */
+export async function busy(matter: Matter, text: string, work: (isWanted: () => boolean) => Promise<void>): Promise<void> {
+  const turn = (turns[matter] ?? 0) + 1;
+  turns[matter] = turn;
+  const isWanted = (): boolean => turns[matter] === turn;
+  const wait = (): string => (at("status").textContent = [...waits.values()].join(" "));
+  waits.set(matter, text);
+  wait();
+  try {
+    await work(isWanted);
+    if (isWanted()) say(matter, null);
+  } catch (error) {
+    if (isWanted()) say(matter, error);
+  }
+  if (!isWanted()) return;
+  waits.delete(matter);
+  wait();
 }
 
 /** Makes the options of a choice. */

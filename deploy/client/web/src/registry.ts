@@ -10,6 +10,9 @@ import { Trouble } from "./trouble";
 /** Where the registry answers to a session. */
 export const REGISTRY = "/demo/v1";
 
+/** Says whether this browser has a session. */
+export const SESSION = "/demo/session";
+
 const KEY = "diaphane key";
 const NAME = /^[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?$/;
 const SELECTOR = /^[a-z0-9](?:[a-z0-9.-]{0,38}[a-z0-9])?$/;
@@ -48,6 +51,9 @@ export class Registry {
 
   /** All aliases of all models, champions first. */
   async choices(): Promise<Choice[]> {
+    // Asked first: the browser writes an error on its console where a request is refused.
+    const { signed_in: isSignedIn } = (await (await this.#get(SESSION)).json()) as { signed_in?: unknown };
+    if (isSignedIn !== true) throw new SignedOut();
     const found: Choice[] = [];
     let address: string | null = `${REGISTRY}/models?limit=200`;
     while (address) {

@@ -7,6 +7,7 @@ import { Geometry } from "./passes/geometry";
 import { type Mode, Screen, meanSquaredError } from "./passes/screen";
 import { type Counted, Renderer, type Technique } from "./renderer";
 import type { Scene } from "./scene";
+import { Trouble } from "./trouble";
 
 /** What one wants to see. */
 export interface Wanted {
@@ -59,6 +60,7 @@ export class Stage {
   #renderer: Renderer | null = null;
   #busy: Promise<void> | null = null;
   #again = false;
+  #lost = false;
   #rest: ReturnType<typeof setTimeout> | undefined;
   #shown: Record<"left" | "right" | "exact", GPUBuffer> | null = null;
 
@@ -73,13 +75,19 @@ export class Stage {
     private readonly failed: (error: unknown) => void,
   ) {
     this.#screen = new Screen(gpu, canvas);
+    void gpu.device.lost.then(() => {
+      this.#lost = true;
+      const remedy = "Load the page again; if it stays so, update the browser and the graphics driver.";
+      failed(new Trouble("The graphics device was lost.", remedy));
+    });
   }
 
   /** Shows another scene, all of it. */
   async open(scene: Scene): Promise<void> {
     while (this.#busy) await this.#busy;
+    const geometry = new Geometry(this.gpu, scene); // if it does not fit, what was there stays
     this.#geometry?.destroy();
-    this.#geometry = new Geometry(this.gpu, scene);
+    this.#geometry = geometry;
     this.#resize(true);
     this.home();
   }
@@ -95,6 +103,7 @@ export class Stage {
   /** Draws soon; errors are measured when nothing changes for a while. */
   draw(): void {
     clearTimeout(this.#rest);
+    if (this.#lost) return;
     if (this.#busy) {
       this.#again = true;
       return;
@@ -104,7 +113,7 @@ export class Stage {
 
   /** Shows what was drawn once more, with another split or mode. */
   present(): void {
-    if (this.#shown && this.#renderer && !this.#busy) this.#show(this.#renderer);
+    if (this.#shown && this.#renderer && !this.#busy && !this.#lost) this.#show(this.#renderer);
   }
 
   /** The picture of a technique at the canvas's size. */
@@ -165,7 +174,11 @@ export class Stage {
   /** Nothing else is drawn while this is. */
   #while(work: () => Promise<void>): void {
     this.#busy = work()
-      .catch(this.failed)
+      .catch((error: unknown) => {
+        // No buffer can be mapped any more: the device is about to be lost, which is said then.
+        const isLost = this.#lost || (error instanceof DOMException && error.name === "AbortError");
+        if (!isLost) this.failed(error);
+      })
       .finally(() => {
         this.#busy = null;
         if (!this.#again) return;
@@ -189,7 +202,7 @@ export class Stage {
     const before = this.#renderer;
     if (!anew && before && before.frame.width === width && before.frame.height === height) return before;
     before?.destroy();
-    this.#shown = null;
+    [this.#renderer, this.#shown] = [null, null];
     [this.canvas.width, this.canvas.height] = [width, height];
     this.#renderer = new Renderer(this.gpu, this.#geometry, width, height);
     return this.#renderer;

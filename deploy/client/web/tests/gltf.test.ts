@@ -1,5 +1,5 @@
 import { readFileSync } from "node:fs";
-import { expect, it } from "vitest";
+import { expect, it, vi } from "vitest";
 
 import { framingView, turned } from "../src/camera";
 import { readGlb } from "../src/gltf";
@@ -38,6 +38,61 @@ it("what is no glTF, needs too much or has nothing is refused with a remedy", as
     "draco",
   );
   await expect(readGlb("x", glb({ asset, scenes: [{ nodes: [] }] }))).rejects.toThrow("nothing to draw");
+});
+
+const TRIANGLE = Buffer.from(new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0]).buffer).toString("base64");
+const PRIMITIVE = { attributes: { POSITION: 0 }, material: 0 };
+
+/** A glTF of one triangle, whose members may be others. */
+function triangle(others: Record<string, unknown> = {}): Uint8Array<ArrayBuffer> {
+  return glb({
+    asset: { version: "2.0" },
+    scenes: [{ nodes: [0] }],
+    nodes: [{ mesh: 0 }],
+    meshes: [{ primitives: [PRIMITIVE] }],
+    materials: [{ alphaMode: "BLEND", pbrMetallicRoughness: { baseColorFactor: [1, 0, 0, 0.5] } }],
+    accessors: [{ bufferView: 0, componentType: 5126, count: 3, type: "VEC3" }],
+    bufferViews: [{ buffer: 0, byteLength: 36 }],
+    buffers: [{ byteLength: 36, uri: `data:application/octet-stream;base64,${TRIANGLE}` }],
+    ...others,
+  });
+}
+
+it("counts that no file means, nodes without end and meshes without triangles are refused, at once", async () => {
+  const accessor = { bufferView: 0, componentType: 5126, count: 3, type: "VEC3" };
+  const without = { componentType: 5126, count: 300_000_000, type: "VEC3" };
+  await expect(readGlb("x", triangle({ accessors: [without] }))).rejects.toThrow("300,000,000 elements");
+  await expect(readGlb("x", triangle({ accessors: [{ ...without, count: 4e9 }] }))).rejects.toThrow("elements");
+  const many = Array.from({ length: 3000 }, () => ({ mesh: 0 }));
+  const scenes = [{ nodes: many.map((_, i) => i) }];
+  const large = { componentType: 5126, count: 30_000, type: "VEC3" };
+  await expect(readGlb("x", triangle({ scenes, nodes: many, accessors: [large] }))).rejects.toThrow("vertices");
+  const deep = [...Array.from({ length: 15_000 }, (_, i) => ({ children: [i + 1] })), { mesh: 0 }];
+  await expect(readGlb("x", triangle({ nodes: deep }))).rejects.toThrow("too deep");
+  const normals = [{ primitives: [{ attributes: { POSITION: 0, NORMAL: 0 } }] }];
+  const two = { meshes: normals, accessors: [{ ...accessor, count: 2 }] };
+  await expect(readGlb("x", triangle(two))).rejects.toThrow("nothing to draw");
+}, 20_000);
+
+it("materials that differ in colour alone are drawn together, each in its colour", async () => {
+  const count = 2_000;
+  const meshes = [{ primitives: Array.from({ length: count }, (_, material) => ({ ...PRIMITIVE, material })) }];
+  const red = (i: number) => ({ pbrMetallicRoughness: { baseColorFactor: [i % 2, 0, 0, 0.5] } });
+  const materials = Array.from({ length: count }, (_, i) => ({ alphaMode: i < 10 ? "OPAQUE" : "BLEND", ...red(i) }));
+  const { batches, colours } = await readGlb("x", triangle({ meshes, materials }));
+  expect(batches.map(({ layer, first, count }) => [layer, first, count])).toEqual([
+    ["opaque", 0, 30],
+    ["transparent", 30, 3 * count - 30],
+  ]);
+  expect([0, 3, 6].map((vertex) => colours[4 * vertex])).toEqual([0, 255, 0]);
+}, 20_000);
+
+it("an image that is none is refused with a remedy", async () => {
+  vi.stubGlobal("createImageBitmap", () => Promise.reject(new DOMException("no", "InvalidStateError")));
+  const materials = [{ pbrMetallicRoughness: { baseColorTexture: { index: 0 } } }];
+  const images = [{ bufferView: 0, mimeType: "image/png" }];
+  await expect(readGlb("x", triangle({ materials, images, textures: [{ source: 0 }] }))).rejects.toThrow("An image in x");
+  vi.unstubAllGlobals();
 });
 
 it("turning keeps the distance, and stays short of the poles", () => {

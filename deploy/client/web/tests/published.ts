@@ -43,6 +43,7 @@ export class Service {
   readonly blobs = new Map<string, Uint8Array<ArrayBuffer>>();
   record: Json = {};
   status = 200;
+  isSignedIn = true;
   #key: webcrypto.CryptoKeyPair | null = null;
 
   /** Publishes a version with a key of its own, or that of the last one. */
@@ -78,6 +79,7 @@ export class Service {
     const path = String(address);
     this.asked.push(path);
     if (this.status !== 200) return new Response('{"title":"No."}', { status: this.status });
+    if (path === "/demo/session") return new Response(JSON.stringify({ signed_in: this.isSignedIn }));
     if (path.startsWith("/demo/v1/blobs/sha256/")) {
       const blob = this.blobs.get(path.split("/").at(-1)!);
       return blob ? new Response(blob) : new Response('{"detail":"There is no such file."}', { status: 404 });

@@ -128,3 +128,9 @@ it("versions are compared as numbers", () => {
   expect(isLower("1.10.0", "1.9.0")).toBe(false);
   expect(isLower("1.0.0", "1.0.0")).toBe(false);
 });
+
+it("models are not asked for where nobody is signed in", async () => {
+  service.isSignedIn = false;
+  await expect(registry.choices()).rejects.toThrow(SignedOut);
+  expect(service.asked).toEqual(["/demo/session"]);
+});

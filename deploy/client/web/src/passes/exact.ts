@@ -21,7 +21,7 @@ export function renderExact(
   shown: GPUBuffer,
 ): void {
   const cursors = frame.zeros(encoder, "cursors", frame.pixels);
-  const pool = frame.room("pool", FRAGMENT_WORDS * fragments);
+  const pool = frame.room("pool", FRAGMENT_WORDS * Math.max(fragments, 1)); // a binding holds one at least
   frame.geometry.drawTransparent(encoder, CAPTURE, 16, frame.depth, [offsets, cursors, pool]);
   frame.forPixels(encoder, ["sort"], "sort_runs", [offsets, pool]);
   const read = [offsets, pool, frame.background.createView(), shown];

@@ -40,6 +40,7 @@ export class Frame {
     const before = this.#buffers.get(name);
     if (before && before.size === 4 * Math.max(count, 1)) return before;
     before?.destroy();
+    this.#buffers.delete(name); // the new one may be more than the device allows
     const made = this.gpu.words(count);
     this.#buffers.set(name, made);
     return made;

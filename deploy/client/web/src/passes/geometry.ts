@@ -3,6 +3,7 @@
 import { type Gpu, type Resource, entriesOf } from "../gpu";
 import type { Batch, Image, Layer, Scene } from "../scene";
 import { shader } from "../shaders";
+import { Trouble } from "../trouble";
 
 export const DEPTH: GPUTextureFormat = "depth32float";
 export const BACKGROUND: GPUTextureFormat = "rgba8unorm";
@@ -223,6 +224,10 @@ export class Geometry {
 function upload(gpu: Gpu, image: Image | null): GPUTexture {
   const { device } = gpu;
   const [width, height] = image ? [image.pixels.width, image.pixels.height] : [1, 1];
+  const most = device.limits.maxTextureDimension2D;
+  if (Math.max(width, height) > most) {
+    throw new Trouble(`An image of ${width} × ${height} is above this device's limit, ${most}.`, "Make it smaller.");
+  }
   const texture = device.createTexture({
     size: [width, height],
     format: "rgba8unorm-srgb",
