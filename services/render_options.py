@@ -81,13 +81,13 @@ class RenderOptions:
     state: Path = Path(".diaphane")
 
     def __post_init__(self) -> None:
+        for side in (self.image_width, *(self.size or ())):
+            if not 1 <= side <= LIMITS.max_side:
+                raise Problem(f"{side} pixels are no side of a picture.", f"Give 1 to {LIMITS.max_side} pixels.")
         check_budget(self.budget, "--budget 2", self.size)
         check_bundle(self.bundle, "--bundle")
         if not (math.isfinite(self.g) and 0.0 <= self.g <= 10.0):
             raise Problem(f"--g {self.g} is not between 0 and 10.", "Change that option.")
-        for side in (self.image_width, *(self.size or ())):
-            if not 1 <= side <= LIMITS.max_side:
-                raise Problem(f"{side} pixels are no side of a picture.", f"Give 1 to {LIMITS.max_side} pixels.")
         if self.output is not None:
             if self.output.suffix.lower() not in SUFFIXES:
                 raise Problem(f"{self.output} is no name of a picture.", "End it in .png or .exr.")

@@ -44,6 +44,6 @@ def replacing(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise Problem(
             f"{path} cannot be written: {str(error.strerror or error).rstrip('.')}.",
-            "Make room, or name another place with --output.",
+            "Make room, or name another place.",
             ExitCode.TRY_AGAIN,
         ) from error

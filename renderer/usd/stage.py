@@ -71,6 +71,11 @@ def check_file(path: Path) -> None:
             "Give a .usd, .usda, .usdc or .usdz file.",
             ExitCode.USAGE,
         )
+    try:
+        str(path.resolve()).encode()
+    except UnicodeEncodeError:
+        readable = str(path).encode(errors="replace").decode()
+        raise Problem(f"The path {readable} is no UTF-8, as USD needs it.", "Rename it.", ExitCode.USAGE) from None
     if path.stat().st_size == 0:
         raise Problem(f"{path} is empty.", "Export the scene again.", ExitCode.USAGE)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Literal
 
 from schemas.pixel_weights import DEFAULT_WEIGHTS
@@ -75,10 +76,15 @@ _SOURCES: Mapping[StageName, tuple[str, ...]] = {
 
 
 def version_of(stage: StageName) -> str:
-    """Code version of a stage here and now: part of the address of whatever it makes."""
-    if stage == "render":
-        return code_version(*_SOURCES["render"]) + scene_version()
-    return code_version(*_SOURCES[stage])
+    """Code version of a stage in this process: part of the address of whatever it makes."""
+    version = _versions()[stage]
+    return version + scene_version() if stage == "render" else version
+
+
+@cache
+def _versions() -> dict[StageName, str]:
+    """Of all stages at once: where files change under a running process, none may be newer than the others."""
+    return {stage: code_version(*sources) for stage, sources in _SOURCES.items()}
 
 
 def scene_version() -> str:

@@ -88,7 +88,7 @@ def remote_source(service: Service) -> Iterator[Source]:
     name, _, alias = service.reference.partition("@")
     asked: dict[str, Any] = {"url": service.url, "key": service.key, "folder": service.state / FETCHED}
     stop, later = threading.Event(), queue.SimpleQueue[Path]()
-    bundles = client.watch(name, alias or "champion", every=_EVERY, stop=stop, **asked)
+    bundles = client.watch(name, alias or "champion", every=_EVERY, stop=stop, allow_rollback=service.follow, **asked)
     try:
         first = next(bundles)
     except client.PullError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,14 @@ def test_bad_files_are_problems_that_name_the_file(
     assert caught.value.code == code
     assert name in caught.value.title
     assert caught.value.remedy
+
+
+def test_a_name_that_is_no_utf_8_is_a_problem(tmp_path: Path) -> None:
+    file = tmp_path / os.fsdecode(b"n\xff.usda")
+    file.write_text("#usda 1.0\n", encoding="utf-8")
+    with pytest.raises(Problem, match=r"n\?\.usda is no UTF-8") as caught:
+        load_scene(file)
+    caught.value.title.encode()
 
 
 def test_a_folder_is_a_problem(tmp_path: Path) -> None:

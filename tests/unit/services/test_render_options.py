@@ -95,6 +95,7 @@ def test_inference_is_one_of_those_there_are() -> None:
         {"g": -1.0},
         {"image_width": 0},
         {"size": (10, 100_000)},
+        {"size": (0, 0)},
         {"output": Path("a.jpg")},
         {"output": Path("a.png"), "frames": (1.0, 2.0)},
     ],
