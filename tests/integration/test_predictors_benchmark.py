@@ -10,7 +10,7 @@ import moderngl
 import pytest
 
 from benchmarks import predictors
-from benchmarks.predicting import learned_scores, summary, training, variants, weighted
+from benchmarks.predicting import learned_scores, learned_tail, summary, training, variants, weighted
 from benchmarks.predicting.variants import Variant
 from trainer.config import TrainConfig
 
@@ -43,6 +43,7 @@ def folder(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Pa
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (predictors, variants, training, summary, weighted, learned_scores):
         monkeypatch.setattr(module, "variants", lambda: FEW)
+    monkeypatch.setattr(learned_tail, "STEPS", 20)
 
 
 def _arguments(folder: Path, *more: str) -> list[str]:
