@@ -347,4 +347,6 @@ def test_where_no_picture_can_be_written_the_output_is_named(folder: Path, capsy
     (folder / "file").touch()
     for name in ("a.png", "a.exr"):
         assert run(["render", "panes.usda", "-w", "16", "-o", f"file/{name}"]) == ExitCode.TRY_AGAIN
-        assert "--output" in capsys.readouterr().err
+        said = capsys.readouterr().err
+        assert f"file/{name} cannot be written" in said
+        assert "name another place" in said
