@@ -14,6 +14,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 from schemas.limits import LIMITS
 from schemas.network import DEFAULT_NETWORK, SIZES, NetworkSize
@@ -21,6 +22,8 @@ from schemas.pixel_weights import DEFAULT_WEIGHTS, PIXEL_WEIGHTS, PixelWeights
 from schemas.problem import ExitCode, Problem
 from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAILS, TailName
 from services.registry import check_name
+
+Name = TypeVar("Name", bound=str)
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,10 +176,7 @@ def parse_tail(text: str, option: str = "--tail") -> TailName:
     Raises:
         Problem: There is none.
     """
-    for tail in TAILS:
-        if tail == text:
-            return tail
-    raise Problem(f"There is no tail '{text}'.", f"Use one of {', '.join(TAILS)}: {option} {DEFAULT_TAIL}.")
+    return _named(text, TAILS, "There is no tail", f"{option} {DEFAULT_TAIL}")
 
 
 def parse_network(text: str) -> NetworkSize:
@@ -185,10 +185,7 @@ def parse_network(text: str) -> NetworkSize:
     Raises:
         Problem: There is none.
     """
-    for size in SIZES:
-        if size == text:
-            return size
-    raise Problem(f"There is no network '{text}'.", f"Use one of {', '.join(SIZES)}: --network {DEFAULT_NETWORK}.")
+    return _named(text, SIZES, "There is no network", f"--network {DEFAULT_NETWORK}")
 
 
 def parse_weights(text: str) -> PixelWeights:
@@ -197,10 +194,7 @@ def parse_weights(text: str) -> PixelWeights:
     Raises:
         Problem: There are none.
     """
-    for weights in PIXEL_WEIGHTS:
-        if weights == text:
-            return weights
-    raise Problem(f"There are no weights '{text}'.", f"Use one of {', '.join(PIXEL_WEIGHTS)}: --weights flip.")
+    return _named(text, PIXEL_WEIGHTS, "There are no weights", "--weights flip")
 
 
 def default_holdout(scenes: Sequence[Path]) -> tuple[Path, ...]:
@@ -210,6 +204,13 @@ def default_holdout(scenes: Sequence[Path]) -> tuple[Path, ...]:
     ranked = sorted(scenes, key=lambda scene: hashlib.sha256(scene.stem.encode()).hexdigest())
     chosen = set(ranked[: max(1, len(scenes) // 4)])
     return tuple(scene for scene in scenes if scene in chosen)
+
+
+def _named(text: str, names: Sequence[Name], refusal: str, example: str) -> Name:
+    for name in names:
+        if name == text:
+            return name
+    raise Problem(f"{refusal} '{text}'.", f"Use one of {', '.join(names)}: {example}.")
 
 
 def _is_unique(tail: tuple[str, ...], scenes: Sequence[Path]) -> bool:

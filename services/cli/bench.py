@@ -13,6 +13,13 @@ from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAIL_HELP
 from services.cli import output
 from services.cli.scene_options import CameraOption, ComplexityOption, RefineOption, VariantOption
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
+from services.cli.technique_options import (
+    InferenceOption,
+    NodesOption,
+    SamplesOption,
+    SteepnessOption,
+    VkbOption,
+)
 
 
 def bench(
@@ -39,19 +46,14 @@ def bench(
         str,
         typer.Option("--tails", help=f"Of bounded techniques, with commas between. {TAIL_HELP}"),
     ] = DEFAULT_TAIL,
-    g: Annotated[float, typer.Option("--g", help="Steepness of the density tail.")] = DENSITY_G,
+    g: SteepnessOption = DENSITY_G,
     bundle: Annotated[
         str | None, typer.Option("--bundle", help="For kbuffer-deep: a folder, or NAME@ALIAS of the registry.")
     ] = None,
-    inference: Annotated[
-        str, typer.Option("--inference", help="How kbuffer-deep runs its network: glsl or onnx.")
-    ] = "glsl",
-    vkb: Annotated[
-        str,
-        typer.Option("--vkb", help="For kbuffer-importance: thesis, no-depth, no-periphery, no-fresnel, no-noise."),
-    ] = "",
-    nodes: Annotated[int | None, typer.Option("--nodes", help="Nodes a pixel of multilayer and adaptive.")] = None,
-    samples: Annotated[int | None, typer.Option("--samples", help="Samples a pixel of stochastic.")] = None,
+    inference: InferenceOption = "glsl",
+    vkb: VkbOption = "",
+    nodes: NodesOption = None,
+    samples: SamplesOption = None,
     camera: CameraOption = None,
     views: Annotated[
         Path | None, typer.Option("--views", help="JSON file with views; all that it has of a scene are measured.")

@@ -13,6 +13,7 @@ from schemas.pixel_weights import DEFAULT_WEIGHTS
 from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAIL_HELP
 from services.cli import output
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
+from services.cli.technique_options import SteepnessOption
 
 if TYPE_CHECKING:
     from services.options import BuildOptions
@@ -36,7 +37,7 @@ def build(
     ] = 3,
     size: Annotated[str, typer.Option("--size", help="Width and height of the pictures, pixels.")] = "1430x960",
     tail: Annotated[str, typer.Option("--tail", help=TAIL_HELP)] = DEFAULT_TAIL,
-    g: Annotated[float, typer.Option("--g", help="Steepness of the density tail.")] = DENSITY_G,
+    g: SteepnessOption = DENSITY_G,
     seed: Annotated[int, typer.Option("--seed", help="Seed of everything drawn at random.")] = 0,
     steps: Annotated[int | None, typer.Option("--steps", help="Optimiser steps. Default: the trainer's.")] = None,
     network: Annotated[

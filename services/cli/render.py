@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAIL_HELP
+from schemas.tail import DENSITY_G
 from services.cli import output
 from services.cli.lines import size
 from services.cli.scene_options import (
@@ -23,6 +23,15 @@ from services.cli.scene_options import (
     WidthOption,
 )
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
+from services.cli.technique_options import (
+    BudgetOption,
+    InferenceOption,
+    NodesOption,
+    SamplesOption,
+    SteepnessOption,
+    TailOption,
+    VkbOption,
+)
 
 if TYPE_CHECKING:
     from services.rendering import Picture
@@ -43,23 +52,16 @@ def render(
         list[str] | None,
         typer.Option("--technique", "-t", help="Name of a technique, or all; repeatable. Default: sbuffer, exact."),
     ] = None,
-    budget: Annotated[float, typer.Option("--budget", help="Fragments, as a multiple of width x height.")] = 2.0,
-    tail: Annotated[
-        str | None, typer.Option("--tail", help=f"{TAIL_HELP} Default: the bundle's, or {DEFAULT_TAIL}.")
-    ] = None,
-    g: Annotated[float, typer.Option("--g", help="Steepness of the density tail.")] = DENSITY_G,
+    budget: BudgetOption = 2.0,
+    tail: TailOption = None,
+    g: SteepnessOption = DENSITY_G,
     bundle: Annotated[
         str | None, typer.Option("--bundle", help="For kbuffer-deep: a folder, or NAME@ALIAS of the registry.")
     ] = None,
-    inference: Annotated[
-        str, typer.Option("--inference", help="How kbuffer-deep runs its network: glsl or onnx.")
-    ] = "glsl",
-    vkb: Annotated[
-        str,
-        typer.Option("--vkb", help="For kbuffer-importance: thesis, no-depth, no-periphery, no-fresnel, no-noise."),
-    ] = "",
-    nodes: Annotated[int | None, typer.Option("--nodes", help="Nodes a pixel of multilayer and adaptive.")] = None,
-    samples: Annotated[int | None, typer.Option("--samples", help="Samples a pixel of stochastic.")] = None,
+    inference: InferenceOption = "glsl",
+    vkb: VkbOption = "",
+    nodes: NodesOption = None,
+    samples: SamplesOption = None,
     compare: Annotated[
         bool, typer.Option("--compare", help="Compare with the exact picture: MSE, PSNR, FLIP.")
     ] = False,

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from schemas.problem import Problem
-from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAIL_HELP
+from schemas.tail import DENSITY_G
 from services.cli import output
 from services.cli.scene_options import (
     WHITE,
@@ -26,6 +26,15 @@ from services.cli.scene_options import (
 )
 from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
+from services.cli.technique_options import (
+    BudgetOption,
+    InferenceOption,
+    NodesOption,
+    SamplesOption,
+    SteepnessOption,
+    TailOption,
+    VkbOption,
+)
 
 
 def view(
@@ -38,11 +47,9 @@ def view(
     layout: Annotated[
         str, typer.Option("--layout", help="single, side-by-side, split, difference or k; keys 1 to 5.")
     ] = "side-by-side",
-    budget: Annotated[float, typer.Option("--budget", help="Fragments, as a multiple of width x height.")] = 2.0,
-    tail: Annotated[
-        str | None, typer.Option("--tail", help=f"{TAIL_HELP} Default: the bundle's, or {DEFAULT_TAIL}.")
-    ] = None,
-    g: Annotated[float, typer.Option("--g", help="Steepness of the density tail.")] = DENSITY_G,
+    budget: BudgetOption = 2.0,
+    tail: TailOption = None,
+    g: SteepnessOption = DENSITY_G,
     model: Annotated[
         str | None, typer.Option("--model", help="For kbuffer-deep: NAME@ALIAS of the server, fetched and verified.")
     ] = None,
@@ -52,15 +59,10 @@ def view(
     watch: Annotated[
         bool, typer.Option("--watch", help="Take every bundle that the alias of --model comes to mean.")
     ] = False,
-    inference: Annotated[
-        str, typer.Option("--inference", help="How kbuffer-deep runs its network: glsl or onnx.")
-    ] = "glsl",
-    vkb: Annotated[
-        str,
-        typer.Option("--vkb", help="For kbuffer-importance: thesis, no-depth, no-periphery, no-fresnel, no-noise."),
-    ] = "",
-    nodes: Annotated[int | None, typer.Option("--nodes", help="Nodes a pixel of multilayer and adaptive.")] = None,
-    samples: Annotated[int | None, typer.Option("--samples", help="Samples a pixel of stochastic.")] = None,
+    inference: InferenceOption = "glsl",
+    vkb: VkbOption = "",
+    nodes: NodesOption = None,
+    samples: SamplesOption = None,
     camera: CameraOption = None,
     views: Annotated[Path | None, typer.Option("--views", help="JSON file with views of the scene.")] = None,
     view: Annotated[

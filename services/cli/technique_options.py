@@ -1,0 +1,21 @@
+"""Options that the commands that render with techniques share."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from schemas.tail import DEFAULT_TAIL, TAIL_HELP
+
+BudgetOption = Annotated[float, typer.Option("--budget", help="Fragments, as a multiple of width x height.")]
+TailOption = Annotated[
+    str | None, typer.Option("--tail", help=f"{TAIL_HELP} Default: the bundle's, or {DEFAULT_TAIL}.")
+]
+SteepnessOption = Annotated[float, typer.Option("--g", help="Steepness of the density tail.")]
+InferenceOption = Annotated[str, typer.Option("--inference", help="How kbuffer-deep runs its network: glsl or onnx.")]
+VkbOption = Annotated[
+    str, typer.Option("--vkb", help="For kbuffer-importance: thesis, no-depth, no-periphery, no-fresnel, no-noise.")
+]
+NodesOption = Annotated[int | None, typer.Option("--nodes", help="Nodes a pixel of multilayer and adaptive.")]
+SamplesOption = Annotated[int | None, typer.Option("--samples", help="Samples a pixel of stochastic.")]
