@@ -66,21 +66,26 @@ def library_versions() -> dict[str, str]:
 
 @lru_cache(maxsize=1)
 def commit() -> str | None:
-    """The commit that the sources are at, with `-dirty` if they were changed since; None where it is not known."""
+    """The commit that the sources are at, with `-dirty` if they were changed since; None where it is not known.
+
+    Pages and results of benchmarks are no sources: a benchmark that writes them goes on with the same commit.
+    """
     if not (ROOT / ".git").exists():  # installed, perhaps within the folder of something else
         return None
     try:
-        found = subprocess.run(
-            ["git", "describe", "--always", "--abbrev=40", "--dirty", "--exclude=*"],
-            cwd=ROOT,
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=30,
-        )
+        head = _git("rev-parse", "HEAD").strip()
+        changed = _git("status", "--porcelain", "--untracked-files=no", "--", ".", *_WRITTEN)
     except (OSError, subprocess.SubprocessError):
         return None
-    return found.stdout.strip() or None
+    return f"{head}-dirty" if changed else head
+
+
+_WRITTEN = (":(exclude)benchmarks/*.md", ":(exclude)benchmarks/results")
+
+
+def _git(*arguments: str) -> str:
+    run = subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=True, timeout=30)
+    return run.stdout
 
 
 def machine() -> dict[str, str]:

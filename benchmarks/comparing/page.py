@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from benchmarks.comparing import tables
+from benchmarks.comparing.scenes import BUNDLE
 from schemas.bench import BenchResult, BenchView
 from services.bench.bars import error_bars
 from services.bench.groups import Group, groups_of
@@ -85,6 +86,10 @@ def _what(result: BenchResult) -> str:
     slow = {cell.technique for cell in cells if cell.repeats < usual}
     lines = [f"{len(views)} views of {len({view.scene for view in views})} scenes, {hours:.1f} h of measuring."]
     lines.append(f"Bundle: {result.bundle}." if result.bundle else "No bundle was given: kbuffer-deep is left out.")
+    if result.bundle and result.bundle.startswith(BUNDLE):
+        lines.append("It was trained on none of these scenes (`python -m benchmarks.comparing.bundle`).")
+    loads = [load for view in views for load in view.load]
+    lines.append(f"Load average of the machine around a view: {min(loads):.1f} to {max(loads):.1f}.")
     if slow:
         lines.append(
             f"{usual} timed frames a cell, fewer where they would take too long (a single one if that alone does): "

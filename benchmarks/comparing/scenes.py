@@ -13,6 +13,8 @@ SHARED = ("sponza", "two_cylinder_engine", "minecraft_village_caves", "chess_set
 ALPHAS: tuple[float | None, ...] = (0.33, 0.15, None)
 """The papers' constants (DHOIT .33, DFA .15), and the materials' own. The first is that of the page's tables."""
 SIZES = ((1430, 960), (1920, 1080))
+BUNDLE = "suite-"
+"""How names of bundles begin that `benchmarks.comparing.bundle` trains on none of these scenes."""
 PATH_FRAMES = 3
 """Of the camera path, at the first opacity and size: flicker costs as much as everything else there."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -63,3 +64,26 @@ def test_machine_and_libraries_are_named() -> None:
     assert versions.machine()["memory"].endswith("GiB")
     assert versions.library_versions()["python"].startswith("3.")
     assert "numpy" in versions.library_versions()
+
+
+def test_what_a_benchmark_writes_leaves_the_commit_as_it_is(tree: Path) -> None:
+    def git(*arguments: str) -> str:
+        who = ("-c", "user.name=a", "-c", "user.email=a@b.c")
+        run = subprocess.run(["git", *who, *arguments], cwd=tree, check=True, capture_output=True, text=True)
+        return run.stdout.strip()
+
+    (tree / "benchmarks" / "results").mkdir(parents=True)
+    for name in ("BENCH.md", "results/bench.jsonl", "suite.py"):
+        (tree / "benchmarks" / name).write_text("1\n")
+    git("init", "-q")
+    git("add", ".")
+    git("commit", "-qm", "all")
+    head = git("rev-parse", "HEAD")
+    for name in ("BENCH.md", "results/bench.jsonl"):
+        (tree / "benchmarks" / name).write_text("2\n")
+    versions.commit.cache_clear()
+    assert versions.commit() == head
+    (tree / "benchmarks" / "suite.py").write_text("2\n")
+    versions.commit.cache_clear()
+    assert versions.commit() == f"{head}-dirty"
+    versions.commit.cache_clear()
