@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -26,8 +27,9 @@ from renderer.samples.glb import HOME
 from renderer.scene import load_scene
 from renderer.techniques import Budget, KBuffer, KBufferDeep, SBuffer, Technique, WeightedBlended
 from renderer.views import framing_view
-from schemas.bundle import ParityReport, Provenance, TailSpec
+from schemas.bundle import MANIFEST, ParityReport, Provenance, TailSpec
 from schemas.colour import display8
+from schemas.tail import DEFAULT_TAIL, TAILS, TailName
 from services.dashboard import SESSION_ANSWERS, demo
 from services.dashboard.page import POLICY
 from trainer.bundle import Description, write_bundle
@@ -39,6 +41,8 @@ SIZED = """window.addEventListener('DOMContentLoaded', () => {
     const style = { boxSizing: 'content-box', width: '480px', height: '320px', aspectRatio: 'auto' };
     Object.assign(document.getElementById('stage')?.style ?? {}, style);
 })"""
+OTHER_TAILS = tuple(tail for tail in TAILS if tail != DEFAULT_TAIL)
+G = 1.25
 AUDIT = Path(__file__).with_name("dashboard_audit.js").read_text(encoding="utf-8").rstrip("\n;")
 
 
@@ -49,20 +53,33 @@ def frame(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Fra
 
 
 @pytest.fixture(scope="module")
-def bundle(frame: Frame, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("bundle")
+def bundles(frame: Frame, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A bundle for every tail, with the same network; that for the default tail is called `glass`."""
+    first = tmp_path_factory.mktemp("bundle")
     provenance = Provenance(scenes={}, code_version="0", seed=0, machine="test")
-    described = Description("glass", TailSpec(name="density-16", g=0.75), "display", 1, provenance, {})
+    described = Description("glass", TailSpec(name=DEFAULT_TAIL, g=0.75), "display", 1, provenance, {})
     parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver="none")
     features = derive(gather(capture(frame).dump, bins=16))
-    write_bundle(folder, random_weights(11), described, features, lambda: parity)
-    return folder
+    manifest = write_bundle(first, random_weights(11), described, features, lambda: parity)
+    made = {"glass": first}
+    for tail in OTHER_TAILS:
+        made[tail] = tmp_path_factory.mktemp("bundles") / tail
+        shutil.copytree(first, made[tail])
+        other = manifest.model_copy(update={"name": tail, "tail": TailSpec(name=tail, g=G)})
+        (made[tail] / MANIFEST).write_text(other.model_dump_json(), encoding="utf-8")
+    return made
 
 
 @pytest.fixture(scope="module")
-def api(bundle: Path, tmp_path_factory: pytest.TempPathFactory) -> Api:
+def bundle(bundles: dict[str, Path]) -> Path:
+    return bundles["glass"]
+
+
+@pytest.fixture(scope="module")
+def api(bundles: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Api:
     made = Api(tmp_path_factory.mktemp("service"), rate=1e6, burst=10**6)
-    made.service.registry.publish("glass", bundle, 0.5, {"views": 2})
+    for name, folder in bundles.items():
+        made.service.registry.publish(name, folder, 0.5, {"views": 2})
     made.service.registry.promote("glass", "1.0.0", "It is first.", who="key_000000000000")
     return made
 
@@ -161,6 +178,26 @@ def test_predicted_slots_use_the_budget_exactly(tab: Tab, frame: Frame, bundle: 
     assert tab.faults == []
 
 
+def _choose(tab: Tab, model: str) -> None:
+    tab.page.locator("#model").select_option(model)
+    tab.page.locator("#model-note").get_by_text(f"{model.split('@')[0]} 1.0.0: ").wait_for()
+
+
+@pytest.mark.parametrize("tail", OTHER_TAILS)
+def test_every_tail_of_a_bundle_is_rendered(tab: Tab, frame: Frame, bundles: dict[str, Path], tail: TailName) -> None:
+    _choose(tab, f"{tail}@1.0.0")
+    picture, k, _ = _pictured(tab, frame, "kbuffer-deep", 0.5)
+    deep = KBufferDeep(bundles[tail])
+    expected = deep.render(frame, Budget(PIXELS // 2, tail=tail, g=G))
+    assert k.sum() == PIXELS // 2
+    assert np.mean(k == expected.k) > 0.98
+    assert _shares(picture, expected.linear) >= 0.999
+    default = deep.render(frame, Budget(PIXELS // 2))
+    assert _shares(picture, default.linear) < _shares(picture, expected.linear) - 0.003
+    _choose(tab, "glass@champion")
+    assert tab.faults == []
+
+
 def test_errors_are_measured_against_the_exact_picture(tab: Tab) -> None:
     page = tab.page
     page.get_by_label("Right").select_option("sbuffer")
@@ -206,6 +243,73 @@ def test_files_are_opened_or_refused_with_a_remedy(tab: Tab, tmp_path: Path) -> 
 def _refused(tab: Tab, path: Path, text: str) -> None:
     tab.page.get_by_label("A file of your own").set_input_files(path)
     tab.page.get_by_role("alert").get_by_text(text).wait_for()
+
+
+def _stack(path: Path, layers: int, aside: float = 0.0) -> Path:
+    """Squares of very thin black glass in one place; small ones where crumbs lie `aside`, for the camera to include."""
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float)
+    faces = np.tile([[0, 1, 2], [0, 2, 3]], (layers, 1))
+    if aside:
+        crumbs = [(side * aside, 0.01 * x, 0.01 * y) for side in (-1, 1) for x, y in ((0, 0), (1, 0), (0, 1))]
+        corners = np.concatenate([corners, crumbs])
+        faces = np.concatenate([faces, [[4, 5, 6], [7, 8, 9]]])
+    glass = trimesh.visual.material.PBRMaterial(baseColorFactor=[0, 0, 0, 1], alphaMode="BLEND")
+    look = trimesh.visual.TextureVisuals(uv=np.zeros((len(corners), 2)), material=glass)
+    mesh = trimesh.Trimesh(corners, faces, vertex_normals=np.tile([0.0, 0, 1], (len(corners), 1)), process=False)
+    mesh.visual = look
+    path.write_bytes(trimesh.exchange.gltf.export_glb(mesh, include_normals=True))
+    return path
+
+
+def test_what_would_keep_the_device_busy_is_refused_at_once(tab: Tab, tmp_path: Path) -> None:
+    page = tab.page
+    _refused(tab, _stack(tmp_path / "glass.glb", 70_000), "The surfaces cover the picture")
+    page.locator("#status:empty").wait_for(state="attached")
+    _refused(tab, _stack(tmp_path / "pile.glb", 5_000, aside=30.0), "A pixel has 5,000 transparent fragments")
+    page.locator("#scene").select_option("glass shells")
+    page.get_by_role("alert").wait_for(state="hidden")
+    page.locator("#figures tr").nth(1).wait_for()
+    assert tab.faults == []
+
+
+def test_what_takes_long_is_drawn_in_runs_and_whole(tab: Tab, tmp_path: Path) -> None:
+    """Two runs of triangles in each pass: no fragment is missing, and none is there twice."""
+    page = tab.page
+    layers = 120
+    page.get_by_label("A file of your own").set_input_files(_stack(tmp_path / "layers.glb", layers))
+    page.locator("#facts").get_by_text(f" {layers}.0 each").wait_for()
+    words, fragments = page.evaluate(
+        """async (view) => {
+            const { words, fragments } = await diaphane.picture(view, 'weighted-blended', 1);
+            return [Array.from(new Set(words)), fragments];
+        }""",
+        {"eye": [0, 0, 0.5], "target": [0, 0, 0], "up": [0, 1, 0], "fov": 38},
+    )
+    assert fragments == layers * PIXELS
+    through = display8(np.full((1, 1, 3), (254 / 255) ** layers, dtype=np.float32))  # of white, by black glass
+    assert abs(min(word & 255 for word in words) - int(through[0, 0, 0])) <= 1  # where no highlight is on the glass
+    page.locator("#scene").select_option("glass shells")
+    assert tab.faults == []
+
+
+def test_files_may_be_dropped_anywhere(tab: Tab) -> None:
+    page = tab.page
+    dropped = page.evaluate(
+        """() => {
+            const data = new DataTransfer();
+            data.items.add(new File(['no glTF'], 'dropped.glb'));
+            return ['dragover', 'drop'].map((kind) => {
+                const event = new DragEvent(kind, { bubbles: true, cancelable: true, dataTransfer: data });
+                document.querySelector('h1').dispatchEvent(event);
+                return event.defaultPrevented;
+            });
+        }"""
+    )
+    assert dropped == [True, True]
+    page.get_by_role("alert").get_by_text("dropped.glb cannot be read").wait_for()
+    page.locator("#scene").select_option("a shelf of bottles")
+    page.get_by_role("alert").wait_for(state="hidden")
+    assert tab.faults == []
 
 
 def test_scenes_without_glass_and_beyond_the_device_are_no_faults(tab: Tab, tmp_path: Path) -> None:
@@ -290,15 +394,45 @@ def test_nobody_signed_in_sees_what_needs_no_model(webgpu: Any, url: str, width:
     opened.context.close()
 
 
-def test_without_webgpu_the_page_says_what_to_do(webgpu: Any, url: str) -> None:
+@pytest.mark.parametrize(
+    ("missing", "said"),
+    [
+        ("Object.defineProperty(Navigator.prototype, 'gpu', { value: undefined })", "This browser has no WebGPU."),
+        ("Object.defineProperty(globalThis, 'isSecureContext', { value: false })", "on secure pages only"),
+        ("GPU.prototype.requestAdapter = async () => null", "no graphics adapter for it"),
+        ("GPUAdapter.prototype.requestDevice = () => Promise.reject(new Error())", "cannot open the graphics device"),
+        ("HTMLCanvasElement.prototype.getContext = () => null", "cannot show what WebGPU draws"),
+    ],
+    ids=["no-webgpu", "http", "no-adapter", "no-device", "no-canvas"],
+)
+def test_without_webgpu_the_page_says_what_to_do(webgpu: Any, url: str, missing: str, said: str) -> None:
     opened = Tab(webgpu, url, 1280, "dark")
-    opened.page.add_init_script("Object.defineProperty(Navigator.prototype, 'gpu', { value: undefined })")
+    opened.page.add_init_script(missing)
     opened.page.goto("/demo")
-    opened.page.get_by_role("alert").get_by_text("no WebGPU").wait_for()
+    opened.page.get_by_role("alert").get_by_text(said).wait_for()
+    assert opened.page.locator("#status").inner_text() == "There is nothing to see without WebGPU."
     assert opened.page.get_by_label("Left").is_disabled()
     assert opened.page.evaluate(AUDIT) == []
     assert opened.faults == []
     opened.context.close()
+
+
+def test_a_sample_that_does_not_come_is_said(webgpu: Any, url: str) -> None:
+    opened = Tab(webgpu, url, 640, "light")
+    opened.page.route("**/*.glb", lambda route: route.abort())
+    opened.page.goto("/demo")
+    opened.page.get_by_role("alert").get_by_text("The sample cannot be loaded.").wait_for()
+    opened.page.locator("#status:empty").wait_for(state="attached")
+    assert [fault for fault in opened.faults if "net::ERR_FAILED" not in fault] == []
+    opened.context.close()
+
+
+def test_without_scripts_the_page_says_so(webgpu: Any, url: str) -> None:
+    context = webgpu.new_context(base_url=url, java_script_enabled=False)
+    page = context.new_page()
+    page.goto("/demo")
+    assert "Allow scripts for it" in page.locator("noscript p").inner_text()
+    context.close()
 
 
 def test_the_page_is_open_and_strict(api: Api) -> None:

@@ -1,5 +1,7 @@
 // A verified bundle, as far as it is rendered with.
 
+import type { Tail } from "./tail";
+
 export interface SelfTest {
   readonly features: readonly (readonly number[])[];
   readonly outputs: readonly (readonly number[])[];
@@ -10,8 +12,7 @@ export interface SelfTest {
 export interface Bundle {
   readonly name: string;
   readonly version: string;
-  /** Depth bins of its tail. */
-  readonly bins: number;
+  readonly tail: Tail;
   /** Its network: `predict.wgsl`. */
   readonly wgsl: string;
   readonly selfTest: SelfTest;

@@ -5,11 +5,16 @@ import { Trouble } from "./trouble";
 export type Resource = GPUBuffer | GPUTextureView | GPUSampler;
 
 /** Limits of which all is asked for that there is; for the others the least that every device has is enough. */
-const WANTED_LIMITS = ["maxStorageBufferBindingSize", "maxBufferSize", "maxTextureDimension2D"] as const;
+const WANTED_LIMITS = [
+  ...(["maxStorageBufferBindingSize", "maxBufferSize", "maxTextureDimension2D"] as const),
+  "maxColorAttachmentBytesPerSample",
+] as const;
 
 export class Gpu {
   /** Whether float32 targets can be blended; else sums are half floats. */
   readonly blendsFloat32: boolean;
+  /** Whether a pass can blend four of them of four components each. */
+  readonly blendsManyFloat32: boolean;
   readonly #pipelines = new Map<string, GPUComputePipeline>();
 
   private constructor(
@@ -17,6 +22,7 @@ export class Gpu {
     readonly description: string,
   ) {
     this.blendsFloat32 = device.features.has("float32-blendable");
+    this.blendsManyFloat32 = this.blendsFloat32 && device.limits.maxColorAttachmentBytesPerSample >= 4 * 16;
   }
 
   /**
@@ -44,7 +50,9 @@ export class Gpu {
     const requiredLimits: Record<string, number> = {};
     for (const name of WANTED_LIMITS) requiredLimits[name] = adapter.limits[name];
     const requiredFeatures = (["float32-blendable"] as const).filter((name) => adapter.features.has(name));
-    const device = await adapter.requestDevice({ requiredFeatures, requiredLimits });
+    const device = await adapter.requestDevice({ requiredFeatures, requiredLimits }).catch(() => {
+      throw new Trouble("The browser has WebGPU, but cannot open the graphics device.", "Load the page again.");
+    });
     const { vendor, architecture, description } = adapter.info;
     return new Gpu(device, description || [vendor, architecture].filter(Boolean).join(" ") || "unknown adapter");
   }

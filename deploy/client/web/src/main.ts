@@ -6,7 +6,7 @@ import type { View } from "./camera";
 import { Gpu } from "./gpu";
 import { readGlb } from "./gltf";
 import { attach } from "./hands";
-import { at, busy, fill, say, show } from "./page";
+import { at, busy, clear, fill, say, show, wait } from "./page";
 import { selfTest } from "./passes/network";
 import type { Mode } from "./passes/screen";
 import { type Memory, Registry, SignedOut } from "./registry";
@@ -49,7 +49,12 @@ async function start(): Promise<void> {
     say("picture", null);
     show(report);
   };
-  const stage = new Stage(await Gpu.open(), at<HTMLCanvasElement>("canvas"), drawn, (error) => say("picture", error));
+  const waits = (is: boolean): void => wait("picture", is ? "The picture is being drawn." : null);
+  const failed = (error: unknown): void => {
+    say("picture", error);
+    clear();
+  };
+  const stage = new Stage(await Gpu.open(), at<HTMLCanvasElement>("canvas"), drawn, waits, failed);
   stage.gpu.device.addEventListener("uncapturederror", ({ error }) => {
     const remedy = "Make the window or the budget smaller, or open a smaller scene; then load the page again.";
     const isFull = error instanceof GPUOutOfMemoryError;
@@ -86,14 +91,14 @@ function listen(stage: Stage): void {
     if (name && selector) registry.forget(name, selector);
     void loadModel(stage);
   });
-  const element = at("stage");
+  // Anywhere on the page: beside the picture a browser would leave the page for the file.
   const over = (event: DragEvent, is: boolean): void => {
     event.preventDefault();
-    element.classList.toggle("over", is);
+    at("stage").classList.toggle("over", is);
   };
-  element.addEventListener("dragover", (event) => over(event, true));
-  element.addEventListener("dragleave", (event) => over(event, false));
-  element.addEventListener("drop", (event) => {
+  addEventListener("dragover", (event) => over(event, event.dataTransfer?.types.includes("Files") ?? false));
+  addEventListener("dragleave", (event) => over(event, false));
+  addEventListener("drop", (event) => {
     over(event, false);
     void openFile(stage, event.dataTransfer?.files[0]);
   });
@@ -104,11 +109,19 @@ function listen(stage: Stage): void {
 const openSample = (stage: Stage): Promise<void> =>
   busy("scene", "The scene is loading.", async (isWanted) => {
     const name = select("scene").value as keyof typeof SAMPLES;
-    const answer = await fetch(SAMPLES[name]);
-    if (!answer.ok) throw new Trouble("The sample cannot be loaded.", "Load the page again.");
-    const scene = await readGlb(name, new Uint8Array(await answer.arrayBuffer()));
+    const scene = await readGlb(name, await sample(SAMPLES[name]));
     if (isWanted()) await stage.open(scene);
   });
+
+async function sample(address: string): Promise<Uint8Array<ArrayBuffer>> {
+  try {
+    const answer = await fetch(address);
+    if (answer.ok) return new Uint8Array(await answer.arrayBuffer());
+  } catch {
+    // The network: the same to do.
+  }
+  throw new Trouble("The sample cannot be loaded.", "Check the connection, then load the page again.");
+}
 
 async function openFile(stage: Stage, file: File | undefined): Promise<void> {
   if (!file) return;

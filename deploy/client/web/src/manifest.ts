@@ -6,6 +6,7 @@
 
 import type { FileRef } from "./api";
 import type { SelfTest } from "./bundle";
+import { type Tail, tailOf } from "./tail";
 
 export const MANIFEST = "manifest.json";
 export const NETWORK = "predict.wgsl";
@@ -19,11 +20,10 @@ const MOST_BYTES = 64 * 2 ** 20;
 const MOST_MANIFEST_BYTES = 2 ** 20;
 const MOST_FILES = 16;
 const MOST_FEATURES = 256;
-const BINS: Readonly<Record<string, number>> = { "density-8": 8, "density-16": 16 };
 const OUTPUTS = ["a,b", "a,b,g"];
 
 export interface Manifest {
-  readonly bins: number;
+  readonly tail: Tail;
   readonly files: Readonly<Record<string, FileRef>>;
   readonly selfTest: SelfTest;
 }
@@ -40,12 +40,12 @@ export function parseManifest(content: string): Manifest {
   if (missing.length) throw new Error(`${missing.join(", ")} is missing`);
   const unknown = Object.keys(fields).filter((name) => !NEEDED.includes(name));
   if (unknown.length) throw new Error(`${unknown.join(", ")} is unknown`);
-  const tail = String(object(fields["tail"])["name"]);
-  const bins = BINS[tail];
+  const { name, g } = object(fields["tail"]);
+  const tail = tailOf(String(name), number(g));
   if (fields["head"] !== "gain-curve" || !OUTPUTS.includes(String(fields["outputs"]))) {
     throw new Error("this page renders bundles with the head gain-curve");
   }
-  if (bins === undefined) throw new Error(`this page renders the tails density-8 and density-16, not ${tail}`);
+  if (!tail || tail.g < 0) throw new Error(`it has a tail that is none, ${name}`);
   const features = list(fields["features"], MOST_FEATURES);
   for (const feature of features.map(object)) {
     if (typeof feature["name"] !== "string" || !(number(feature["std"]) > 0))
@@ -54,7 +54,7 @@ export function parseManifest(content: string): Manifest {
   }
   const files = parseFiles(fields["files"]);
   if (!(NETWORK in files)) throw new Error(`there is no ${NETWORK}`);
-  return { bins, files, selfTest: selfTestOf(fields, features.length) };
+  return { tail, files, selfTest: selfTestOf(fields, features.length) };
 }
 
 /**

@@ -29,6 +29,15 @@ export function say(matter: Matter, error: unknown): void {
 }
 
 const waits = new Map<Matter, string>();
+
+/** Says what people wait for in a matter; null: for nothing any more. */
+export function wait(matter: Matter, text: string | null): void {
+  if (text === null) waits.delete(matter);
+  else waits.set(matter, text);
+  const said = [...waits.values()].join(" ");
+  if (at("status").textContent !== said) at("status").textContent = said;
+}
+
 const turns: Partial<Record<Matter, number>> = {};
 
 /**
@@ -40,18 +49,14 @@ export async function busy(matter: Matter, text: string, work: (isWanted: () => 
   const turn = (turns[matter] ?? 0) + 1;
   turns[matter] = turn;
   const isWanted = (): boolean => turns[matter] === turn;
-  const wait = (): string => (at("status").textContent = [...waits.values()].join(" "));
-  waits.set(matter, text);
-  wait();
+  wait(matter, text);
   try {
     await work(isWanted);
     if (isWanted()) say(matter, null);
   } catch (error) {
     if (isWanted()) say(matter, error);
   }
-  if (!isWanted()) return;
-  waits.delete(matter);
-  wait();
+  if (isWanted()) wait(matter, null);
 }
 
 /** Makes the options of a choice. */
@@ -59,14 +64,20 @@ export function fill(select: HTMLSelectElement, options: readonly (readonly [val
   select.replaceChildren(...options.map(([value, text]) => new Option(text, value)));
 }
 
+/** Shows nothing of what was drawn before. */
+export function clear(): void {
+  at("figures").replaceChildren();
+  at("facts").textContent = "";
+}
+
 /** Shows what was drawn. */
 export function show(report: Report): void {
-  const { counted, left, right, width, height } = report;
+  const { counted, left, right, width, height, bytes } = report;
   at("figures").replaceChildren(row("left", left), row("right", right));
   const deep = counted.occupied ? (counted.fragments / counted.occupied).toFixed(1) : "0";
   at("facts").textContent =
     `${width} × ${height} pixels, ${number(counted.fragments)} transparent fragments in ${number(counted.occupied)} ` +
-    `pixels, ${deep} each.`;
+    `pixels, ${deep} each; ${(bytes / 2 ** 20).toFixed(1)} MiB of buffers.`;
 }
 
 function row(side: string, figures: Figures): HTMLTableRowElement {
@@ -76,10 +87,11 @@ function row(side: string, figures: Figures): HTMLTableRowElement {
   head.textContent = `${side}: ${figures.technique}`;
   line.append(head);
   const { error, slots, milliseconds } = figures;
-  const decibels = error === null ? "…" : error === 0 ? "exact" : psnr(error).toFixed(2);
+  const known = (text: (error: number) => string): string =>
+    error === null ? "…" : Number.isNaN(error) ? "–" : text(error);
   const texts = [
-    error === null ? "…" : (1e5 * error).toFixed(3),
-    decibels,
+    known((each) => (1e5 * each).toFixed(3)),
+    known((each) => (each === 0 ? "exact" : psnr(each).toFixed(2))),
     slots ? number(slots) : "–",
     milliseconds.toFixed(1),
   ];

@@ -144,7 +144,7 @@ export class Registry {
     const others = Object.keys(manifest.files);
     const contents = await Promise.all(others.map((file) => this.#file(release, file)));
     const wgsl = new TextDecoder().decode(contents[others.indexOf(NETWORK)]);
-    return { name, version, bins: manifest.bins, wgsl, selfTest: manifest.selfTest };
+    return { name, version, tail: manifest.tail, wgsl, selfTest: manifest.selfTest };
   }
 
   /** A file of a release, whose size and hash are right. */

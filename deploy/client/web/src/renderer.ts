@@ -11,15 +11,16 @@ import { Frame } from "./passes/frame";
 import { Geometry } from "./passes/geometry";
 import { predict } from "./passes/network";
 import { type Sums, gather } from "./passes/sums";
-import { CEILING } from "./shaders";
+import { CEILING, TURNS } from "./shaders";
+import { DEFAULT_TAIL, type Tail } from "./tail";
 import { Trouble } from "./trouble";
+import { Work } from "./work";
 
 export const TECHNIQUES = ["kbuffer-deep", "kbuffer", "weighted-blended", "sbuffer"] as const;
 export type Technique = (typeof TECHNIQUES)[number];
 
 /** Linear grey behind everything. */
 const CLEAR = 1.0;
-const DEFAULT_BINS = 16;
 
 /** What a view has. */
 export interface Counted {
@@ -50,6 +51,11 @@ export class Renderer {
     this.frame.destroy();
   }
 
+  /** Whether drawing the view that was begun takes so long that there are pauses. */
+  get isSlow(): boolean {
+    return this.#geometry.isSlow;
+  }
+
   /** Where each pixel's run of slots began in the last picture with slots. */
   get offsets(): GPUBuffer {
     return this.#allocation.offsets;
@@ -60,32 +66,48 @@ export class Renderer {
     return this.#slots;
   }
 
-  /** Begins a view: the opaque surfaces, and how many transparent fragments there are. */
-  async look(view: View): Promise<Counted> {
-    const { frame, gpu } = this;
-    const encoder = gpu.device.createCommandEncoder();
-    frame.draw(encoder, view, this.#geometry.scene.bounds, CLEAR);
-    this.#allocation.count(encoder);
-    this.#allocation.begin(encoder, CEILING);
-    gpu.device.queue.submit([encoder.finish()]);
+  /**
+   * Begins a view: the opaque surfaces, and how many transparent fragments there are.
+   *
+   * @param work Nothing is pending in it.
+   * @throws Trouble There is too much to draw.
+   */
+  async look(work: Work, view: View): Promise<Counted> {
     this.#sums = null;
-    const state = await gpu.read(this.#allocation.state);
-    this.#counted = { fragments: state[0]!, occupied: state[1]! };
+    await this.frame.draw(work, view, this.#geometry.scene.bounds, CLEAR);
+    this.#allocation.count(work);
+    this.#allocation.begin(work, CEILING);
+    work.submit();
+    const [fragments, occupied, deepest] = await this.#allocation.totals();
+    if (deepest > TURNS) {
+      const [found, most] = [deepest, TURNS].map((each) => each.toLocaleString("en"));
+      throw new Trouble(
+        `A pixel has ${found} transparent fragments; up to ${most} can be drawn here.`,
+        "Look from elsewhere, or open a simpler scene.",
+      );
+    }
+    this.#counted = { fragments, occupied };
     return this.#counted;
   }
 
   /**
    * Renders the view that was begun.
    *
+   * @param work Nothing is pending in it.
    * @param factor Slots a pixel of the window on average: F / (W H).
    * @param bundle For `kbuffer-deep`.
    * @param shown Name of the buffer that gets the picture.
    * @returns The picture: sRGB and k, a byte each, of every pixel.
    */
-  render(technique: Technique, factor: number, bundle: Bundle | null, shown: string): GPUBuffer {
-    const { frame, gpu } = this;
+  async render(
+    work: Work,
+    technique: Technique,
+    factor: number,
+    bundle: Bundle | null,
+    shown: string,
+  ): Promise<GPUBuffer> {
+    const { frame } = this;
     const into = frame.words(shown, frame.pixels);
-    const encoder = gpu.device.createCommandEncoder();
     const { fragments } = this.#counted;
     const budget = budgetOf(factor, frame.pixels);
     // What a fixed k leaves empty is allocted, too; to kbuffer-deep more slots than fragments would be of no use.
@@ -95,46 +117,48 @@ export class Renderer {
       "weighted-blended": 0,
       sbuffer: fragments,
     }[technique];
-    if (technique === "sbuffer") this.#renderExact(encoder, into);
-    else if (technique === "weighted-blended") renderBlended(frame, encoder, into);
-    else this.#renderChain(encoder, technique, this.#slots, bundle, into);
-    gpu.device.queue.submit([encoder.finish()]);
+    if (technique === "sbuffer") await this.#renderExact(work, into);
+    else if (technique === "weighted-blended") await renderBlended(frame, work, into);
+    else await this.#renderChain(work, technique, this.#slots, bundle, into);
+    work.submit();
     return into;
   }
 
-  #renderExact(encoder: GPUCommandEncoder, into: GPUBuffer): void {
-    this.#allocation.begin(encoder, CEILING);
-    this.#allocation.place(encoder);
-    renderExact(this.frame, encoder, this.#allocation.offsets, this.#counted.fragments, into);
+  async #renderExact(work: Work, into: GPUBuffer): Promise<void> {
+    this.#allocation.begin(work, CEILING);
+    this.#allocation.place(work);
+    await renderExact(this.frame, work, this.#allocation.offsets, this.#counted.fragments, into);
   }
 
-  #renderChain(
-    encoder: GPUCommandEncoder,
+  async #renderChain(
+    work: Work,
     technique: "kbuffer" | "kbuffer-deep",
     budget: number,
     bundle: Bundle | null,
     into: GPUBuffer,
-  ): void {
+  ): Promise<void> {
     const [frame, allocation] = [this.frame, this.#allocation];
-    allocation.begin(encoder, budget);
+    allocation.begin(work, budget);
     if (technique === "kbuffer") {
-      const sums = this.#gathered(encoder, DEFAULT_BINS, false);
-      allocation.placeFixed(encoder);
-      renderChain(frame, encoder, allocation.offsets, budget, sums, into);
+      const sums = await this.#gathered(work, DEFAULT_TAIL, false);
+      allocation.placeFixed(work);
+      await renderChain(frame, work, allocation.offsets, budget, sums, into);
       return;
     }
     if (!bundle) throw new Trouble("There is no bundle for kbuffer-deep.", "Choose a model.");
-    const sums = this.#gathered(encoder, bundle.bins, true);
-    predict(frame, encoder, bundle, sums, allocation);
-    allocation.solve(encoder);
-    allocation.place(encoder);
-    renderChain(frame, encoder, allocation.offsets, budget, sums, into);
+    const sums = await this.#gathered(work, bundle.tail, true);
+    predict(frame, work, bundle, sums, allocation);
+    allocation.solve(work);
+    allocation.place(work);
+    await renderChain(frame, work, allocation.offsets, budget, sums, into);
   }
 
-  #gathered(encoder: GPUCommandEncoder, bins: number, all: boolean): Sums {
+  /** What was gathered for a tail of as many bins serves this one. */
+  async #gathered(work: Work, tail: Tail, all: boolean): Promise<Sums> {
     const before = this.#sums;
-    if (before && before.bins === bins && (!all || before.targets.length > 0)) return before;
-    this.#sums = gather(this.frame, encoder, bins, all);
+    if (before && before.tail.bins === tail.bins && (!all || before.targets.length > 0)) return { ...before, tail };
+    this.#sums = null; // what there was is overwritten
+    this.#sums = await gather(this.frame, work, tail, all);
     return this.#sums;
   }
 }

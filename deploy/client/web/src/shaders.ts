@@ -1,6 +1,8 @@
 // WGSL modules: a file with the files that it needs before it, and the constants of schemas/tail.py and
 // renderer/allocation as one text.
 
+import { DEFAULT_TAIL, type Tail, type TailName } from "./tail";
+
 const SOURCES: Record<string, string> = import.meta.glob("./shaders/*.wgsl", {
   query: "?raw",
   import: "default",
@@ -13,20 +15,37 @@ export const BLOCK = 2048;
 export const EDGES = 64;
 /** Index of the greatest price. */
 export const LAST = 115 << 14;
-/** Rounds in which any price is found. */
-export const ROUNDS = 4;
+/** Rounds in which any price is found, the one around the last frame's with them. */
+export const ROUNDS = 5;
 /** Where sums of fragments stop; budgets are below. */
 export const CEILING = 2 ** 31 - 1;
-/** Fragments of one pixel that can have a slot. */
-export const TURNS = 60_000;
+/** Most fragments of one pixel. */
+export const TURNS = 4096;
 
-/** Words a pixel that the gather pass leaves, and words a pixel of packed depth bins. */
-export const gatheredWords = (bins: number): number => 2 + bins;
-export const keptWords = (bins: number): number => 1 + bins / 8;
+/** Words a pixel of the gather pass: depth bins are half words. */
+export const gatheredWords = (bins: number): number => 2 + bins / 2;
 
-function constants(bins: number): string {
+/** Beyond it nothing changes: exponents stop at MAX_EXPONENT. */
+const MOST_G = 1e30;
+
+const CODES: Readonly<Record<TailName, string>> = {
+  "exact-coverage": "EXACT_COVERAGE",
+  density: "DENSITY",
+  "weighted-average": "WEIGHTED_AVERAGE",
+  paper: "PAPER",
+  "density-8": "BINNED",
+  "density-16": "BINNED",
+};
+
+function constants({ name, bins, g }: Tail): string {
+  const codes = [...new Set(Object.values(CODES))].map((code, i) => `const ${code} = ${i}u;`);
   return `
+${codes.join("\n")}
+const TAIL = ${CODES[name]};
+const DENSITY_G = f32(${Math.min(g, MOST_G)});
 const BINS = ${bins}u;
+const LAST_BIN = ${Math.max(bins, 1) - 1}u;
+const EVERY = ${bins && 16 / bins}u;
 const GATHERED = ${gatheredWords(bins)}u;
 const ROOT_SHARE = 0.6f;
 const PLAIN_SHARE = 0.4f;
@@ -51,14 +70,14 @@ const MOST_RATE = 4096.0f;
  * The text of a module.
  *
  * @param names Files of `shaders/`, without suffix, in order.
- * @param bins Depth bins of the tail.
+ * @param tail Which the module is for.
  * @param before Text in front of all, such as a bundle's network.
  */
-export function shader(names: readonly string[], bins = 16, before = ""): string {
+export function shader(names: readonly string[], tail = DEFAULT_TAIL, before = ""): string {
   const texts = names.map((name) => {
     const text = SOURCES[`./shaders/${name}.wgsl`];
     if (text === undefined) throw new Error(`there is no shader ${name}`);
     return text;
   });
-  return [before, constants(bins), ...texts].join("\n");
+  return [before, constants(tail), ...texts].join("\n");
 }

@@ -8,6 +8,7 @@ import { type Mode, Screen, meanSquaredError } from "./passes/screen";
 import { type Counted, Renderer, type Technique } from "./renderer";
 import type { Scene } from "./scene";
 import { Trouble } from "./trouble";
+import { Abandoned, Work } from "./work";
 
 /** What one wants to see. */
 export interface Wanted {
@@ -20,7 +21,7 @@ export interface Wanted {
   split: number;
 }
 
-/** What a technique has cost, and its error; null as long as it is not measured. */
+/** What a technique has cost, and its error; null as long as it is not measured, NaN where it cannot be. */
 export interface Figures {
   readonly technique: Technique;
   readonly milliseconds: number;
@@ -34,6 +35,8 @@ export interface Report {
   readonly right: Figures;
   readonly width: number;
   readonly height: number;
+  /** Of the GPU's memory, beside the scene. */
+  readonly bytes: number;
 }
 
 /** A picture, read back. */
@@ -60,18 +63,22 @@ export class Stage {
   #renderer: Renderer | null = null;
   #busy: Promise<void> | null = null;
   #again = false;
+  /** Grows when what is being drawn is no longer wanted. */
+  #turn = 0;
   #lost = false;
   #rest: ReturnType<typeof setTimeout> | undefined;
   #shown: Record<"left" | "right" | "exact", GPUBuffer> | null = null;
 
   /**
    * @param told Gets what was drawn.
+   * @param waits Gets whether a picture takes a while.
    * @param failed Gets what went wrong.
    */
   constructor(
     readonly gpu: Gpu,
     readonly canvas: HTMLCanvasElement,
     private readonly told: (report: Report) => void,
+    private readonly waits: (is: boolean) => void,
     private readonly failed: (error: unknown) => void,
   ) {
     this.#screen = new Screen(gpu, canvas);
@@ -84,8 +91,9 @@ export class Stage {
 
   /** Shows another scene, all of it. */
   async open(scene: Scene): Promise<void> {
-    while (this.#busy) await this.#busy;
     const geometry = new Geometry(this.gpu, scene); // if it does not fit, what was there stays
+    ++this.#turn;
+    while (this.#busy) await this.#busy;
     this.#geometry?.destroy();
     this.#geometry = geometry;
     this.#resize(true);
@@ -105,6 +113,7 @@ export class Stage {
     clearTimeout(this.#rest);
     if (this.#lost) return;
     if (this.#busy) {
+      ++this.#turn;
       this.#again = true;
       return;
     }
@@ -124,8 +133,9 @@ export class Stage {
       this.#while(async () => {
         try {
           const renderer = this.#resize(false)!;
-          const { fragments } = await renderer.look(view);
-          const words = await this.gpu.read(renderer.render(technique, factor, this.bundle, "picture"));
+          const work = new Work(this.gpu);
+          const { fragments } = await renderer.look(work, view);
+          const words = await this.gpu.read(await renderer.render(work, technique, factor, this.bundle, "picture"));
           resolve({ words, offsets: await this.gpu.read(renderer.offsets), fragments });
         } catch (error) {
           reject(error);
@@ -137,22 +147,27 @@ export class Stage {
   async #drawAll(): Promise<void> {
     const renderer = this.#resize(false);
     if (!renderer || !this.view) return;
-    const counted = await renderer.look(this.view);
-    const left = await this.#side(renderer, "left");
-    const right = await this.#side(renderer, "right");
+    const work = this.#work();
+    const counted = await renderer.look(work, this.view);
+    this.waits(renderer.isSlow);
+    const left = await this.#side(renderer, work, "left");
+    const right = await this.#side(renderer, work, "right");
     const exact = renderer.frame.words("exact", renderer.frame.pixels);
     this.#shown = { left: left.buffer, right: right.buffer, exact };
-    const { width, height } = renderer.frame;
-    if (this.wanted.mode === "error") renderer.render("sbuffer", 1, null, "exact");
+    if (this.wanted.mode === "error") await renderer.render(work, "sbuffer", 1, null, "exact");
     this.#show(renderer);
-    this.told({ counted, left: left.figures, right: right.figures, width, height });
+    this.#tell(renderer, counted, left.figures, right.figures);
     this.#rest = setTimeout(() => this.#measure(renderer, counted, left.figures, right.figures), REST);
   }
 
-  async #side(renderer: Renderer, side: "left" | "right"): Promise<{ buffer: GPUBuffer; figures: Figures }> {
+  async #side(
+    renderer: Renderer,
+    work: Work,
+    side: "left" | "right",
+  ): Promise<{ buffer: GPUBuffer; figures: Figures }> {
     const technique = this.wanted[side];
     const begun = performance.now();
-    const buffer = renderer.render(technique, this.wanted.factor, this.bundle, side);
+    const buffer = await renderer.render(work, technique, this.wanted.factor, this.bundle, side);
     await this.gpu.device.queue.onSubmittedWorkDone();
     const milliseconds = performance.now() - begun;
     return { buffer, figures: { technique, milliseconds, slots: renderer.slots, error: null } };
@@ -162,13 +177,33 @@ export class Stage {
     if (this.#busy || !this.#shown || renderer !== this.#renderer) return;
     const shown = this.#shown;
     this.#while(async () => {
-      const exact = renderer.render("sbuffer", 1, null, "exact");
-      const errors: number[] = [];
-      for (const side of [shown.left, shown.right]) errors.push(await meanSquaredError(renderer.frame, side, exact));
-      const { width, height } = renderer.frame;
-      const measured = [left, right].map((figures, i) => ({ ...figures, error: errors[i]! }));
-      this.told({ counted, left: measured[0]!, right: measured[1]!, width, height });
+      const errors = await this.#errors(renderer, [shown.left, shown.right]);
+      this.#tell(renderer, counted, { ...left, error: errors[0]! }, { ...right, error: errors[1]! });
     });
+  }
+
+  /** Errors of pictures; NaN where all fragments are more than the device holds. */
+  async #errors(renderer: Renderer, pictures: readonly GPUBuffer[]): Promise<number[]> {
+    const errors: number[] = [];
+    try {
+      const exact = await renderer.render(this.#work(), "sbuffer", 1, null, "exact");
+      for (const picture of pictures) errors.push(await meanSquaredError(renderer.frame, picture, exact));
+      return errors;
+    } catch (error) {
+      if (error instanceof Trouble) return pictures.map(() => NaN);
+      throw error;
+    }
+  }
+
+  #tell(renderer: Renderer, counted: Counted, left: Figures, right: Figures): void {
+    const { width, height, bytes } = renderer.frame;
+    this.told({ counted, left, right, width, height, bytes });
+  }
+
+  /** For a picture that is given up as soon as another is wanted. */
+  #work(): Work {
+    const turn = this.#turn;
+    return new Work(this.gpu, () => turn === this.#turn);
   }
 
   /** Nothing else is drawn while this is. */
@@ -177,10 +212,14 @@ export class Stage {
       .catch((error: unknown) => {
         // No buffer can be mapped any more: the device is about to be lost, which is said then.
         const isLost = this.#lost || (error instanceof DOMException && error.name === "AbortError");
-        if (!isLost) this.failed(error);
+        if (isLost || error instanceof Abandoned) return;
+        this.#shown = null;
+        this.#screen.clear();
+        this.failed(error);
       })
       .finally(() => {
         this.#busy = null;
+        this.waits(false);
         if (!this.#again) return;
         this.#again = false;
         this.draw();

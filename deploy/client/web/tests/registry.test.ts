@@ -20,7 +20,7 @@ afterEach(() => vi.restoreAllMocks());
 describe("a bundle that is right", () => {
   it("comes whole, and signed", async () => {
     const bundle = await pull();
-    expect(bundle).toMatchObject({ name: "glass", version: "1.0.0", bins: 16, isSigned: true });
+    expect(bundle).toMatchObject({ name: "glass", version: "1.0.0", tail: { bins: 16 }, isSigned: true });
     expect(bundle.wgsl).toBe("fn of predict.wgsl");
     expect(new Set(service.asked).size).toBe(4);
   });
@@ -108,12 +108,16 @@ describe("a manifest", () => {
   const parse = (change: Record<string, unknown>) =>
     parseManifest(JSON.stringify({ ...manifestOf({ "predict.wgsl": file }), ...change }));
 
-  it("is read", () => expect(parse({}).bins).toBe(16));
+  it("is read", () => expect(parse({}).tail.bins).toBe(16));
+  it("may have a tail without bins", () =>
+    expect(parse({ tail: { name: "density", g: 1 } }).tail).toEqual({ name: "density", bins: 0, g: 1 }));
   it.each([
     [{ surprise: 1 }, "surprise is unknown"],
     [{ parity: undefined }, "parity is missing"],
     [{ format: "diaphane-bundle/3" }, "format"],
-    [{ tail: { name: "density", g: 1 } }, "tails density-8 and density-16"],
+    [{ tail: { name: "density-4", g: 1 } }, "density-4"],
+    [{ tail: { name: "density", g: -1 } }, "density"],
+    [{ tail: { name: "density" } }, "not finite"],
     [{ head: "importance" }, "head"],
     [{ features: [{ name: "log_n", mean: 0, std: 0 }] }, "spread"],
     [{ files: { "../x": file } }, "name or hash"],

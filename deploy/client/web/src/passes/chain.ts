@@ -1,12 +1,18 @@
 // The k(p) nearest fragments of every pixel by the two-pass chain, the tail, and the resolve
 // (renderer/techniques/chain.py).
 
+import type { Work } from "../work";
 import type { Frame } from "./frame";
 import type { Pass } from "./geometry";
 import type { Sums } from "./sums";
 
-const DEPTHS: Pass = { files: ["chain_depth"], entryPoint: "chain_depth", writes: [false, true], targets: [] };
-const COLOURS = ["statistics", "depth_bins", "chain_colour"];
+const DEPTHS: Pass = { files: ["chain_depth"], entryPoint: "chain_depth", writes: [false, true] };
+const COLOURS: Pass = {
+  files: ["statistics", "depth_bins", "chain_colour"],
+  entryPoint: "chain_colour",
+  writes: [false, false, true, false, false],
+};
+const RESOLVE = ["statistics", "display", "resolve_chain"];
 
 /**
  * Renders with given slots.
@@ -16,34 +22,22 @@ const COLOURS = ["statistics", "depth_bins", "chain_colour"];
  * @param sums Of this view: what the tail reads.
  * @param shown [P], gets the picture.
  */
-export function renderChain(
+export async function renderChain(
   frame: Frame,
-  encoder: GPUCommandEncoder,
+  work: Work,
   offsets: GPUBuffer,
   slots: number,
   sums: Sums,
   shown: GPUBuffer,
-): void {
+): Promise<void> {
   const { geometry, depth, statistics, background } = frame;
-  const depths = frame.zeros(encoder, "depths", slots);
-  const colours = frame.zeros(encoder, "colours", slots);
-  geometry.drawTransparent(encoder, DEPTHS, sums.bins, depth, [offsets, depths]);
-  const format = frame.gpu.sumFormat;
-  const tail = frame.target("tail", format);
-  const second: Pass = {
-    files: COLOURS,
-    entryPoint: "chain_colour",
-    writes: [false, false, true, false, false],
-    targets: [format],
-  };
-  geometry.drawTransparent(
-    encoder,
-    second,
-    sums.bins,
-    depth,
-    [offsets, depths, colours, statistics, sums.kept],
-    [tail],
-  );
-  const read = [offsets, colours, sums.kept, background.createView(), tail.createView(), shown];
-  frame.forPixels(encoder, ["depth_bins", "display", "resolve_chain"], "resolve_chain", read, { bins: sums.bins });
+  const { tail, gathered } = sums;
+  const depths = frame.zeros(work, "depths", slots);
+  const colours = frame.zeros(work, "colours", slots);
+  await geometry.drawTransparent(work, DEPTHS, depth, [offsets, depths]);
+  const rest = frame.target("tail", frame.gpu.sumFormat);
+  const read = [offsets, depths, colours, statistics, gathered];
+  await geometry.drawTransparent(work, { ...COLOURS, tail }, depth, read, [rest]);
+  const resources = [offsets, colours, statistics, gathered, background.createView(), rest.createView(), shown];
+  frame.forPixels(work, RESOLVE, "resolve_chain", resources, { tail });
 }

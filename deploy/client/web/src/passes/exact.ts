@@ -1,9 +1,10 @@
 // `sbuffer`, exact: every fragment in contiguous per-pixel runs, sorted, composited (renderer/techniques/sbuffer.py).
 
+import type { Work } from "../work";
 import type { Frame } from "./frame";
 import type { Pass } from "./geometry";
 
-const CAPTURE: Pass = { files: ["capture"], entryPoint: "capture", writes: [false, true, true], targets: [] };
+const CAPTURE: Pass = { files: ["capture"], entryPoint: "capture", writes: [false, true, true] };
 const FRAGMENT_WORDS = 2;
 
 /**
@@ -13,17 +14,17 @@ const FRAGMENT_WORDS = 2;
  * @param fragments N.
  * @param shown [P], gets the picture.
  */
-export function renderExact(
+export async function renderExact(
   frame: Frame,
-  encoder: GPUCommandEncoder,
+  work: Work,
   offsets: GPUBuffer,
   fragments: number,
   shown: GPUBuffer,
-): void {
-  const cursors = frame.zeros(encoder, "cursors", frame.pixels);
+): Promise<void> {
+  const cursors = frame.zeros(work, "cursors", frame.pixels);
   const pool = frame.room("pool", FRAGMENT_WORDS * Math.max(fragments, 1)); // a binding holds one at least
-  frame.geometry.drawTransparent(encoder, CAPTURE, 16, frame.depth, [offsets, cursors, pool]);
-  frame.forPixels(encoder, ["sort"], "sort_runs", [offsets, pool]);
+  await frame.geometry.drawTransparent(work, CAPTURE, frame.depth, [offsets, cursors, pool]);
+  frame.forPixels(work, ["sort"], "sort_runs", [offsets, pool]);
   const read = [offsets, pool, frame.background.createView(), shown];
-  frame.forPixels(encoder, ["display", "resolve_exact"], "resolve_exact", read);
+  frame.forPixels(work, ["display", "resolve_exact"], "resolve_exact", read);
 }

@@ -4,10 +4,20 @@ import { type Bounds, type View, cameraBlock } from "../camera";
 import { type Gpu, type Resource, groupsFor } from "../gpu";
 import { encodeGamma2 } from "../scene";
 import { shader } from "../shaders";
+import { DEFAULT_TAIL } from "../tail";
+import type { Work } from "../work";
 import { BACKGROUND, DEPTH, type Geometry, type Pass } from "./geometry";
 
 const STATISTICS = 3;
-const COUNT: Pass = { files: ["count"], entryPoint: "count_fragments", writes: [true], targets: [] };
+const TEXEL_BYTES: Partial<Record<GPUTextureFormat, number>> = {
+  [BACKGROUND]: 4,
+  [DEPTH]: 4,
+  r16float: 2,
+  r32float: 4,
+  rgba16float: 8,
+  rgba32float: 16,
+};
+const COUNT: Pass = { files: ["count"], entryPoint: "count_fragments", writes: [true] };
 
 export class Frame {
   readonly pixels: number;
@@ -30,6 +40,13 @@ export class Frame {
     this.statistics = this.words("statistics", STATISTICS * this.pixels);
   }
 
+  /** Bytes of all buffers and textures that there are by now. */
+  get bytes(): number {
+    const buffers = [...this.#buffers.values()].reduce((sum, { size }) => sum + size, 0);
+    const targets = [...this.#targets.values()].reduce((sum, { format }) => sum + TEXEL_BYTES[format]!, 0);
+    return buffers + targets * this.pixels;
+  }
+
   /** Gives back all buffers and textures. */
   destroy(): void {
     for (const each of [...this.#buffers.values(), ...this.#targets.values()]) each.destroy();
@@ -46,10 +63,10 @@ export class Frame {
     return made;
   }
 
-  /** The same, perhaps with room for more; its first words are zero when the encoder's commands run. */
-  zeros(encoder: GPUCommandEncoder, name: string, count: number): GPUBuffer {
+  /** The same, perhaps with room for more; its first words are zero when the work is done. */
+  zeros(work: Work, name: string, count: number): GPUBuffer {
     const buffer = this.room(name, count);
-    encoder.clearBuffer(buffer, 0, 4 * count);
+    work.encoder.clearBuffer(buffer, 0, 4 * count);
     return buffer;
   }
 
@@ -58,51 +75,57 @@ export class Frame {
     return this.words(name, Math.max(count, (this.#buffers.get(name)?.size ?? 0) / 4));
   }
 
-  /** A texture of the frame's size that is kept under a name. */
+  /** A texture of the frame's size that is kept under a name and its format. */
   target(name: string, format: GPUTextureFormat): GPUTexture {
-    let texture = this.#targets.get(name);
+    const key = `${name} ${format}`;
+    let texture = this.#targets.get(key);
     if (!texture) {
       const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.TEXTURE_BINDING;
       texture = this.gpu.device.createTexture({ size: [this.width, this.height], format, usage });
-      this.#targets.set(name, texture);
+      this.#targets.set(key, texture);
     }
     return texture;
   }
 
   /** Runs a compute shader for every pixel, 64 a group. */
   forPixels(
-    encoder: GPUCommandEncoder,
+    work: Work,
     files: readonly string[],
     entryPoint: string,
     resources: readonly Resource[],
-    { bins = 16, before = "", threads = this.pixels } = {},
+    { tail = DEFAULT_TAIL, before = "", threads = this.pixels } = {},
   ): void {
-    this.dispatch(encoder, shader(files, bins, before), entryPoint, resources, groupsFor(threads));
+    this.dispatch(work, shader(["pixels", ...files], tail, before), entryPoint, resources, groupsFor(threads));
   }
 
   /** Runs a compute shader. */
   dispatch(
-    encoder: GPUCommandEncoder,
+    work: Work,
     code: string,
     entryPoint: string,
     resources: readonly Resource[],
     groups: readonly [number, number],
   ): void {
     const pipeline = this.gpu.compute(code, entryPoint);
-    const pass = encoder.beginComputePass();
+    const pass = work.encoder.beginComputePass();
     pass.setPipeline(pipeline);
     pass.setBindGroup(0, this.gpu.bind(pipeline, resources));
     pass.dispatchWorkgroups(...groups);
     pass.end();
   }
 
-  /** Draws the opaque surfaces and counts the transparent fragments of a view; the clear colour is linear grey. */
-  draw(encoder: GPUCommandEncoder, view: View, bounds: Bounds, clear: number): void {
+  /**
+   * Draws the opaque surfaces and counts the transparent fragments of a view.
+   *
+   * @param clear Linear grey behind everything.
+   * @throws Trouble There is too much to draw.
+   */
+  async draw(work: Work, view: View, bounds: Bounds, clear: number): Promise<void> {
     const { geometry, width, height } = this;
-    geometry.look(cameraBlock(view, bounds, geometry.scene.up, width, height));
+    await geometry.look(cameraBlock(view, bounds, geometry.scene.up, width, height), this.pixels);
     const grey = encodeGamma2(clear) / 255;
-    geometry.drawOpaque(encoder, this.background, this.depth, [grey, grey, grey, 1]);
-    encoder.clearBuffer(this.statistics);
-    geometry.drawTransparent(encoder, COUNT, 16, this.depth, [this.statistics]);
+    await geometry.drawOpaque(work, this.background, this.depth, [grey, grey, grey, 1]);
+    work.encoder.clearBuffer(this.statistics);
+    await geometry.drawTransparent(work, COUNT, this.depth, [this.statistics]);
   }
 }

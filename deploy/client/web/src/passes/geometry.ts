@@ -1,9 +1,11 @@
 // A scene on the GPU, and its geometry passes: one vertex shader, so that depth is the same in all of them.
 
-import { type Gpu, type Resource, entriesOf } from "../gpu";
+import { type Gpu, type Resource, entriesOf, groupsFor } from "../gpu";
 import type { Batch, Image, Layer, Scene } from "../scene";
 import { shader } from "../shaders";
+import type { Tail } from "../tail";
 import { Trouble } from "../trouble";
+import { Work } from "../work";
 
 export const DEPTH: GPUTextureFormat = "depth32float";
 export const BACKGROUND: GPUTextureFormat = "rgba8unorm";
@@ -32,8 +34,20 @@ export interface Pass {
   readonly entryPoint: string;
   /** Storage buffers in the order of their bindings: whether a shader writes them. */
   readonly writes: readonly boolean[];
-  /** Formats of the targets that it adds to. */
-  readonly targets: readonly GPUTextureFormat[];
+  /** Of the shaders. */
+  readonly tail?: Tail;
+}
+
+/** Triangles whose area is added up together, and pixels that are drawn at most without giving the GPU back. */
+const TOGETHER = 64;
+const MOST_AT_ONCE = 2 ** 24;
+/** Pixels that the triangles of a view may cover, again and again. */
+const MOST_COVERED = 2 ** 28;
+
+/** Indices from `first` to `end`. */
+interface Run {
+  readonly first: number;
+  readonly end: number;
 }
 
 interface Drawn {
@@ -49,15 +63,21 @@ export class Geometry {
   readonly #drawn: Drawn[];
   readonly #layouts: { camera: GPUBindGroupLayout; frame: GPUBindGroupLayout; look: GPUBindGroupLayout };
   readonly #pipelines = new Map<string, GPURenderPipeline>();
+  /** The triangles of this view in runs that take about as long. */
+  #runs: readonly Run[] = [];
 
   constructor(
     readonly gpu: Gpu,
     readonly scene: Scene,
   ) {
     const { device } = gpu;
-    const { VERTEX, INDEX, UNIFORM } = GPUBufferUsage;
-    this.#buffers = [scene.positions, scene.normals, scene.uvs, scene.colours].map((data) => gpu.filled(data, VERTEX));
-    this.#indices = gpu.filled(scene.indices, INDEX);
+    const { VERTEX, INDEX, UNIFORM, STORAGE } = GPUBufferUsage;
+    const { positions, normals, uvs, colours } = scene;
+    this.#buffers = [
+      gpu.filled(positions, VERTEX | STORAGE),
+      ...[normals, uvs, colours].map((data) => gpu.filled(data, VERTEX)),
+    ];
+    this.#indices = gpu.filled(scene.indices, INDEX | STORAGE);
     this.#camera = gpu.filled(new Uint8Array(176), UNIFORM);
     const both = GPUShaderStage.VERTEX | GPUShaderStage.FRAGMENT;
     const visibility = GPUShaderStage.FRAGMENT;
@@ -87,32 +107,54 @@ export class Geometry {
     for (const each of [...this.#buffers, this.#indices, this.#camera, ...this.#textures]) each.destroy();
   }
 
-  /** Moves the camera; `block` is `cameraBlock`'s. */
-  look(block: ArrayBuffer): void {
+  /** Whether drawing this view once takes so long that there are pauses. */
+  get isSlow(): boolean {
+    return this.#runs.length > 1;
+  }
+
+  /**
+   * Moves the camera, and looks how much there is to draw from there.
+   *
+   * @param block Of `cameraBlock`.
+   * @param pixels Of the window.
+   * @throws Trouble It is too much for a page that has to stay usable.
+   */
+  async look(block: ArrayBuffer, pixels: number): Promise<void> {
     this.gpu.device.queue.writeBuffer(this.#camera, 0, block);
+    const areas = await this.#areas();
+    const sum = areas.reduce((one, two) => one + two, 0);
+    const covered = Number.isNaN(sum) ? Infinity : sum;
+    if (covered > MOST_COVERED) {
+      const [times, most] = [covered, MOST_COVERED].map((each) => Math.floor(each / pixels).toLocaleString("en"));
+      throw new Trouble(
+        `The surfaces cover the picture ${times} times over; at this size, ${most} times can be drawn here.`,
+        "Look from elsewhere, make the window smaller, or open a simpler scene.",
+      );
+    }
+    this.#runs = runsOf(areas, this.scene.indices.length);
   }
 
   /** Draws the opaque surfaces. */
-  drawOpaque(encoder: GPUCommandEncoder, background: GPUTexture, depth: GPUTexture, clear: GPUColor): void {
-    const pipeline = this.#pipeline("opaque", () => ({
+  async drawOpaque(work: Work, background: GPUTexture, depth: GPUTexture, clear: GPUColor): Promise<void> {
+    const pipeline = this.#pipeline(shader(["camera", "surface", "opaque"]), "opaque_colour", () => ({
       layout: [this.#layouts.camera, this.#layouts.look],
-      files: ["surface", "opaque"],
-      entryPoint: "opaque_colour",
       targets: [{ format: BACKGROUND }],
       depth: { format: DEPTH, depthWriteEnabled: true, depthCompare: "less" },
     }));
-    const pass = encoder.beginRenderPass({
-      colorAttachments: [{ view: background.createView(), loadOp: "clear", storeOp: "store", clearValue: clear }],
-      depthStencilAttachment: {
-        view: depth.createView(),
-        depthLoadOp: "clear",
-        depthStoreOp: "store",
-        depthClearValue: 1,
-      },
+    await this.#draw(work, ["opaque", "mixed"], (loadOp) => {
+      const pass = work.encoder.beginRenderPass({
+        colorAttachments: [{ view: background.createView(), loadOp, storeOp: "store", clearValue: clear }],
+        depthStencilAttachment: {
+          view: depth.createView(),
+          depthLoadOp: loadOp,
+          depthStoreOp: "store",
+          depthClearValue: 1,
+        },
+      });
+      pass.setPipeline(pipeline);
+      pass.setBindGroup(0, this.#group(this.#layouts.camera, [this.#camera]));
+      return pass;
     });
-    pass.setPipeline(pipeline);
-    pass.setBindGroup(0, this.#group(this.#layouts.camera, [this.#camera]));
-    this.#draw(pass, ["opaque", "mixed"]);
   }
 
   /**
@@ -122,42 +164,68 @@ export class Geometry {
    * @param buffers Bound to group 2, in order.
    * @param targets Cleared to zero, then added to.
    */
-  drawTransparent(
-    encoder: GPUCommandEncoder,
+  async drawTransparent(
+    work: Work,
     what: Pass,
-    bins: number,
     depth: GPUTexture,
     buffers: readonly GPUBuffer[],
     targets: readonly GPUTexture[] = [],
-  ): void {
-    const pipeline = this.#pipeline(`${what.entryPoint} ${bins} ${what.targets.join()}`, () => ({
+  ): Promise<void> {
+    const code = shader(["camera", "surface", ...what.files], what.tail);
+    const pipeline = this.#pipeline(code, what.entryPoint, () => ({
       layout: [this.#layouts.frame, this.#layouts.look, this.#storage(what.writes)],
-      files: ["surface", ...what.files],
-      bins,
-      entryPoint: what.entryPoint,
-      targets: what.targets.map((format) => ({ format, blend: BLEND })),
+      targets: targets.map(({ format }) => ({ format, blend: BLEND })),
       // The shader tests by itself. The attachment is there since a pass needs one.
       depth: { format: DEPTH, depthWriteEnabled: false, depthCompare: "always" },
     }));
-    const pass = encoder.beginRenderPass({
-      colorAttachments: targets.map((target) => ({ view: target.createView(), loadOp: "clear", storeOp: "store" })),
-      depthStencilAttachment: { view: depth.createView(), depthReadOnly: true },
+    await this.#draw(work, ["mixed", "transparent"], (loadOp) => {
+      const pass = work.encoder.beginRenderPass({
+        colorAttachments: targets.map((target) => ({ view: target.createView(), loadOp, storeOp: "store" })),
+        depthStencilAttachment: { view: depth.createView(), depthReadOnly: true },
+      });
+      pass.setPipeline(pipeline);
+      pass.setBindGroup(0, this.#group(this.#layouts.frame, [this.#camera, depth.createView()]));
+      pass.setBindGroup(2, this.#group(pipeline.getBindGroupLayout(2), buffers));
+      return pass;
     });
-    pass.setPipeline(pipeline);
-    pass.setBindGroup(0, this.#group(this.#layouts.frame, [this.#camera, depth.createView()]));
-    pass.setBindGroup(2, this.#group(pipeline.getBindGroupLayout(2), buffers));
-    this.#draw(pass, ["mixed", "transparent"]);
   }
 
-  #draw(pass: GPURenderPassEncoder, layers: readonly Layer[]): void {
-    this.#buffers.forEach((buffer, slot) => pass.setVertexBuffer(slot, buffer));
-    pass.setIndexBuffer(this.#indices, "uint32");
-    for (const { batch, look } of this.#drawn) {
-      if (!layers.includes(batch.layer)) continue;
-      pass.setBindGroup(1, look);
-      pass.drawIndexed(batch.count, 1, batch.first);
+  /** Draws the triangles of some layers run by run, with a pause after each but the last. */
+  async #draw(
+    work: Work,
+    layers: readonly Layer[],
+    begin: (loadOp: GPULoadOp) => GPURenderPassEncoder,
+  ): Promise<void> {
+    for (const [i, run] of this.#runs.entries()) {
+      if (i > 0) await work.pause();
+      const pass = begin(i > 0 ? "load" : "clear");
+      this.#buffers.forEach((buffer, slot) => pass.setVertexBuffer(slot, buffer));
+      pass.setIndexBuffer(this.#indices, "uint32");
+      for (const { batch, look } of this.#drawn) {
+        const [first, end] = [Math.max(batch.first, run.first), Math.min(batch.first + batch.count, run.end)];
+        if (!layers.includes(batch.layer) || end <= first) continue;
+        pass.setBindGroup(1, look);
+        pass.drawIndexed(end - first, 1, first);
+      }
+      pass.end();
     }
+  }
+
+  /** Pixels that each `TOGETHER` triangles cover from where the camera is. */
+  async #areas(): Promise<Float32Array> {
+    const groups = Math.ceil(this.scene.indices.length / (3 * TOGETHER));
+    const areas = this.gpu.words(groups);
+    const work = new Work(this.gpu);
+    const pipeline = this.gpu.compute(shader(["camera", "areas"]), "add_areas");
+    const pass = work.encoder.beginComputePass();
+    pass.setPipeline(pipeline);
+    pass.setBindGroup(0, this.gpu.bind(pipeline, [this.#camera, this.#buffers[0]!, this.#indices, areas]));
+    pass.dispatchWorkgroups(...groupsFor(TOGETHER * groups));
     pass.end();
+    work.submit();
+    const words = await this.gpu.read(areas);
+    areas.destroy();
+    return new Float32Array(words.buffer);
   }
 
   #group(layout: GPUBindGroupLayout, resources: readonly Resource[]): GPUBindGroup {
@@ -191,21 +259,20 @@ export class Geometry {
   }
 
   #pipeline(
-    key: string,
+    code: string,
+    entryPoint: string,
     describe: () => {
       layout: GPUBindGroupLayout[];
-      files: string[];
-      bins?: number;
-      entryPoint: string;
       targets: GPUColorTargetState[];
       depth: GPUDepthStencilState;
     },
   ): GPURenderPipeline {
+    const key = `${entryPoint}\n${code}`;
     let made = this.#pipelines.get(key);
     if (!made) {
-      const { layout, files, bins, entryPoint, targets, depth } = describe();
+      const { layout, targets, depth } = describe();
       const { device } = this.gpu;
-      const module = device.createShaderModule({ code: shader(files, bins), label: entryPoint });
+      const module = device.createShaderModule({ code, label: entryPoint });
       made = device.createRenderPipeline({
         label: entryPoint,
         layout: device.createPipelineLayout({ bindGroupLayouts: layout }),
@@ -218,6 +285,21 @@ export class Geometry {
     }
     return made;
   }
+}
+
+/** All indices, cut where `MOST_AT_ONCE` pixels are covered; a group of triangles stays whole. */
+export function runsOf(areas: ArrayLike<number>, indices: number): Run[] {
+  const runs: Run[] = [];
+  let [first, sum] = [0, 0];
+  for (let group = 0; group < areas.length; ++group) {
+    const begin = 3 * TOGETHER * group;
+    if (sum > 0 && sum + areas[group]! > MOST_AT_ONCE) {
+      runs.push({ first, end: begin });
+      [first, sum] = [begin, 0];
+    }
+    sum += areas[group]!;
+  }
+  return [...runs, { first, end: indices }];
 }
 
 /** An image with its mipmaps; none is one white texel. */
@@ -239,7 +321,7 @@ function upload(gpu: Gpu, image: Image | null): GPUTexture {
     return texture;
   }
   device.queue.copyExternalImageToTexture({ source: image.pixels }, { texture }, [width, height]);
-  const module = device.createShaderModule({ code: shader(["mipmap"]) });
+  const module = device.createShaderModule({ code: shader(["cover", "mipmap"]) });
   const pipeline = device.createRenderPipeline({
     layout: "auto",
     vertex: { module, entryPoint: "cover" },

@@ -4,6 +4,7 @@ import type { Bundle } from "../bundle";
 import type { Gpu } from "../gpu";
 import { shader } from "../shaders";
 import { Trouble } from "../trouble";
+import type { Work } from "../work";
 import type { Allocation } from "./allocation";
 import type { Frame } from "./frame";
 import type { Sums } from "./sums";
@@ -11,11 +12,11 @@ import type { Sums } from "./sums";
 const FILES = ["state", "statistics", "depth_bins", "curves"];
 
 /** Predicts a and 1 / b of every pixel that has a choice, into the allocation's curves. */
-export function predict(frame: Frame, encoder: GPUCommandEncoder, bundle: Bundle, sums: Sums, into: Allocation): void {
+export function predict(frame: Frame, work: Work, bundle: Bundle, sums: Sums, into: Allocation): void {
   const textures = [frame.background, ...sums.targets].map((texture) => texture.createView());
-  const buffers = [into.state, frame.statistics, sums.gathered, sums.kept, into.curves];
-  const options = { bins: bundle.bins, before: bundle.wgsl };
-  frame.forPixels(encoder, FILES, "predict_curves", [...buffers, ...textures], options);
+  const buffers = [into.state, frame.statistics, sums.gathered, into.curves];
+  const options = { tail: bundle.tail, before: bundle.wgsl };
+  frame.forPixels(work, FILES, "predict_curves", [...buffers, ...textures], options);
 }
 
 /**
@@ -27,7 +28,7 @@ export async function selfTest(gpu: Gpu, bundle: Bundle): Promise<void> {
   const { features, outputs, output_scale: scale, tolerance } = bundle.selfTest;
   const { STORAGE, COPY_SRC } = GPUBufferUsage;
   gpu.device.pushErrorScope("validation");
-  const pipeline = gpu.compute(shader(["self_test"], bundle.bins, bundle.wgsl), "answer_rows");
+  const pipeline = gpu.compute(shader(["self_test"], bundle.tail, bundle.wgsl), "answer_rows");
   const rows = gpu.filled(new Float32Array(features.flat()), STORAGE);
   const answers = gpu.filled(new Float32Array(outputs.flat().length), STORAGE | COPY_SRC);
   const encoder = gpu.device.createCommandEncoder();

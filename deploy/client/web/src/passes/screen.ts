@@ -3,6 +3,8 @@
 import { type Gpu, entriesOf } from "../gpu";
 import { shader } from "../shaders";
 import { blocksOf } from "./allocation";
+import { Trouble } from "../trouble";
+import { Work } from "../work";
 import type { Frame } from "./frame";
 
 export const MODES = ["picture", "count", "error"] as const;
@@ -13,9 +15,9 @@ export type Mode = (typeof MODES)[number];
 export async function meanSquaredError(frame: Frame, one: GPUBuffer, two: GPUBuffer): Promise<number> {
   const blocks = blocksOf(frame.pixels);
   const squares = frame.words("squares", blocks);
-  const encoder = frame.gpu.device.createCommandEncoder();
-  frame.dispatch(encoder, shader(["difference"]), "add_squares", [one, two, squares], [blocks, 1]);
-  frame.gpu.device.queue.submit([encoder.finish()]);
+  const work = new Work(frame.gpu);
+  frame.dispatch(work, shader(["difference"]), "add_squares", [one, two, squares], [blocks, 1]);
+  work.submit();
   const sums = await frame.gpu.read(squares);
   return sums.reduce((sum, each) => sum + each, 0) / (3 * frame.pixels * 255 ** 2);
 }
@@ -28,20 +30,33 @@ export class Screen {
   readonly #pipeline: GPURenderPipeline;
   readonly #wanted: GPUBuffer;
 
+  /**
+   * @param canvas Where they are shown.
+   * @throws Trouble It cannot show any.
+   */
   constructor(
     readonly gpu: Gpu,
     canvas: HTMLCanvasElement,
   ) {
     const format = navigator.gpu.getPreferredCanvasFormat();
-    this.#context = canvas.getContext("webgpu")!;
+    const context = canvas.getContext("webgpu");
+    if (!context) throw new Trouble("The browser cannot show what WebGPU draws.", "Update the browser.");
+    this.#context = context;
     this.#context.configure({ device: gpu.device, format, alphaMode: "opaque" });
-    const module = gpu.device.createShaderModule({ code: shader(["present"]) });
+    const module = gpu.device.createShaderModule({ code: shader(["cover", "present"]) });
     this.#pipeline = gpu.device.createRenderPipeline({
       layout: "auto",
       vertex: { module, entryPoint: "cover" },
       fragment: { module, entryPoint: "present", targets: [{ format }] },
     });
     this.#wanted = gpu.filled(new Uint32Array(4), GPUBufferUsage.UNIFORM);
+  }
+
+  /** Shows what is behind every picture. */
+  clear(): void {
+    const encoder = this.gpu.device.createCommandEncoder();
+    this.#begin(encoder).end();
+    this.gpu.device.queue.submit([encoder.finish()]);
   }
 
   /** Shows two pictures, [P] each, beside each other; `split` is the column where the right one begins. */
@@ -52,8 +67,7 @@ export class Screen {
     new Uint32Array(block).set([MODES.indexOf(mode), frame.width], 1);
     device.queue.writeBuffer(this.#wanted, 0, block);
     const encoder = device.createCommandEncoder();
-    const view = this.#context.getCurrentTexture().createView();
-    const pass = encoder.beginRenderPass({ colorAttachments: [{ view, loadOp: "clear", storeOp: "store" }] });
+    const pass = this.#begin(encoder);
     pass.setPipeline(this.#pipeline);
     const layout = this.#pipeline.getBindGroupLayout(0);
     const entries = entriesOf([this.#wanted, left, right, exact]);
@@ -61,5 +75,12 @@ export class Screen {
     pass.draw(3);
     pass.end();
     device.queue.submit([encoder.finish()]);
+  }
+
+  #begin(encoder: GPUCommandEncoder): GPURenderPassEncoder {
+    const view = this.#context.getCurrentTexture().createView();
+    return encoder.beginRenderPass({
+      colorAttachments: [{ view, loadOp: "clear", storeOp: "store", clearValue: [1, 1, 1, 1] }],
+    });
   }
 }

@@ -1,37 +1,37 @@
 // The gather pass and the packed depth bins: what the tail reads, and with `all` what a network reads.
 
-import { gatheredWords, keptWords } from "../shaders";
+import { gatheredWords } from "../shaders";
+import type { Tail } from "../tail";
+import type { Work } from "../work";
 import type { Frame } from "./frame";
 import type { Pass } from "./geometry";
 
 const FILES = ["statistics", "depth_bins", "gather"];
-const SUMS = 4;
-const HALF: GPUTextureFormat = "rgba16float";
-const BINS_ONLY: Pass = { files: FILES, entryPoint: "gather_bins", writes: [false, true], targets: [] };
-const ALL: Pass = {
-  files: FILES,
-  entryPoint: "gather_all",
-  writes: [false, true],
-  targets: Array.from({ length: SUMS }, () => HALF),
-};
+const TARGETS = 4;
+const WRITES = [false, true];
+const TAIL_ONLY: Pass = { files: FILES, entryPoint: "gather_tail", writes: WRITES };
+const ALL: Pass = { files: FILES, entryPoint: "gather_all", writes: WRITES };
 
 export interface Sums {
-  readonly bins: number;
-  /** What the gather pass counts in words (gather.wgsl). */
+  readonly tail: Tail;
+  /** What is gathered in words, its depth bins packed (depth_bins.wgsl). */
   readonly gathered: GPUBuffer;
-  /** Optical depth and depth bins, packed (depth_bins.wgsl). */
-  readonly kept: GPUBuffer;
-  /** What it blends; empty if nobody asked for it. */
+  /** What is blended; empty if nobody asked for it. */
   readonly targets: readonly GPUTexture[];
 }
 
 /** Gathers what is to be known of every pixel's fragments. */
-export function gather(frame: Frame, encoder: GPUCommandEncoder, bins: number, all: boolean): Sums {
-  const gathered = frame.zeros(encoder, "gathered", gatheredWords(bins) * frame.pixels);
-  const kept = frame.words("kept", keptWords(bins) * frame.pixels);
-  const targets = all ? Array.from({ length: SUMS }, (_, i) => frame.target(`sums${i}`, HALF)) : [];
+export async function gather(frame: Frame, work: Work, tail: Tail, all: boolean): Promise<Sums> {
+  const gathered = frame.zeros(work, "gathered", gatheredWords(tail.bins) * frame.pixels);
+  const format = formatFor(frame, tail);
+  const targets = all ? Array.from({ length: TARGETS }, (_, i) => frame.target(`sums${i}`, format)) : [];
   const buffers = [frame.statistics, gathered];
-  frame.geometry.drawTransparent(encoder, all ? ALL : BINS_ONLY, bins, frame.depth, buffers, targets);
-  frame.forPixels(encoder, ["depth_bins", "pack"], "pack_bins", [gathered, kept], { bins });
-  return { bins, gathered, kept, targets };
+  await frame.geometry.drawTransparent(work, { ...(all ? ALL : TAIL_ONLY), tail }, frame.depth, buffers, targets);
+  frame.forPixels(work, ["depth_bins", "pack"], "pack_bins", [gathered], { tail });
+  return { tail, gathered, targets };
+}
+
+/** Of what a network reads. A plain tail shows every slot that a rounding has moved: it gets float32, where there is. */
+function formatFor(frame: Frame, tail: Tail): GPUTextureFormat {
+  return tail.bins === 0 && frame.gpu.blendsManyFloat32 ? "rgba32float" : "rgba16float";
 }

@@ -4,29 +4,32 @@
 @group(2) @binding(1) var<storage, read> depths: array<u32>;
 @group(2) @binding(2) var<storage, read_write> colours: array<atomic<u32>>;
 @group(2) @binding(3) var<storage, read> statistics: array<Statistics>;
-@group(2) @binding(4) var<storage, read> kept: array<u32>;     // [P][WORDS]
+@group(2) @binding(4) var<storage, read> gathered: array<u32>;  // [P][GATHERED]
 
 // Share of D in front of a bin.
-fn share_in_front(at: u32, bin: u32) -> f32 {
+fn share_in_front(p: u32, bin: u32) -> f32 {
     if (bin == 0u) {
         return 0.0;
     }
     if (bin == BINS) {
         return 1.0;
     }
-    let word = kept[at + 1u + (bin - 1u) / 8u];
-    return f32((word >> (4u * ((bin - 1u) & 7u))) & 15u) / f32(SHARE_LEVELS);
+    return f32((gathered[share_word(p, bin)] >> share_shift(bin)) & SHARE_LEVELS) / f32(SHARE_LEVELS);
 }
 
-// Optical depth in front of a fragment: the bins before its own, and of its bin's others, taken as evenly spread.
+// Optical depth in front of a fragment, as far as the tail asks for it. With bins: those before its own, and of its
+// bin's others, taken as evenly spread.
 fn in_front(p: u32, z: f32, own: f32) -> f32 {
-    let at = WORDS * p;
-    let total = bitcast<f32>(kept[at]);
-    let place = bin_place(z, nearest(statistics[p]), extent(statistics[p]));
-    let bin = min(u32(place), BINS - 1u);
-    let before = total * share_in_front(at, bin);
-    let others = total * share_in_front(at, bin + 1u) - before - own;
-    return before + max(others, 0.0) * (place - f32(bin));
+    let total = bitcast<f32>(gathered[GATHERED * p]);
+    let x = relative_depth(z, statistics[p]);
+    if (TAIL == BINNED) {
+        let place = bin_place(x);
+        let bin = min(u32(place), LAST_BIN);
+        let before = total * share_in_front(p, bin);
+        let others = total * share_in_front(p, bin + 1u) - before - own;
+        return before + max(others, 0.0) * (place - f32(bin));
+    }
+    return select(0.0, DENSITY_G * total * x, TAIL == DENSITY);
 }
 
 fn first_slot_not_nearer(first: u32, last: u32, z: u32) -> u32 {

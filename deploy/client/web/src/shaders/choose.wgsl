@@ -12,7 +12,7 @@ fn choose(@builtin(local_invocation_index) lane: u32) {
     }
     part[lane] = own;
     workgroupBarrier();
-    if (lane > 0u) {
+    if (lane > 0u || state.complete == 1u || is_found(state.low, state.high)) {
         return;
     }
     for (var j = 0u; j < u32(EDGES); j++) {
@@ -28,6 +28,8 @@ fn choose(@builtin(local_invocation_index) lane: u32) {
     }
     let low = state.low;
     let high = state.high;
+    state.answer = low;
+    state.warm = 1u;
     for (var j = 0; j < EDGES; j++) {
         state.edge[j] = edge_between(low, high, j);
     }

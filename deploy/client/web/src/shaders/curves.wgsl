@@ -3,13 +3,12 @@
 @group(0) @binding(0) var<storage, read> state: State;
 @group(0) @binding(1) var<storage, read> statistics: array<Statistics>;
 @group(0) @binding(2) var<storage, read> gathered: array<u32>;
-@group(0) @binding(3) var<storage, read> kept: array<u32>;
-@group(0) @binding(4) var<storage, read_write> curves: array<vec2f>;
-@group(0) @binding(5) var background: texture_2d<f32>;
-@group(0) @binding(6) var sums0: texture_2d<f32>;
-@group(0) @binding(7) var sums1: texture_2d<f32>;
-@group(0) @binding(8) var sums2: texture_2d<f32>;
-@group(0) @binding(9) var sums3: texture_2d<f32>;
+@group(0) @binding(3) var<storage, read_write> curves: array<vec2f>;
+@group(0) @binding(4) var background: texture_2d<f32>;
+@group(0) @binding(5) var sums0: texture_2d<f32>;
+@group(0) @binding(6) var sums1: texture_2d<f32>;
+@group(0) @binding(7) var sums2: texture_2d<f32>;
+@group(0) @binding(8) var sums3: texture_2d<f32>;
 
 // `clamp`, and the least for NaN, which a network that overflows can answer.
 fn within(x: f32, least: f32, most: f32) -> f32 {
@@ -18,24 +17,21 @@ fn within(x: f32, least: f32, most: f32) -> f32 {
 }
 
 fn sums_of(p: u32) -> array<vec4f, 11> {
-    let size = textureDimensions(background);
-    let xy = vec2u(p % size.x, p / size.x);
     let here = statistics[p];
-    let second = textureLoad(sums2, xy, 0);
-    let third = textureLoad(sums3, xy, 0);
+    let second = texel_of(sums2, p);
+    let third = texel_of(sums3, p);
     let word = ~gathered[GATHERED * p + 1u];
-    let at = WORDS * p;
     var s: array<vec4f, 11>;
-    s[0] = vec4f(f32(here.n), second.w, third.w, bitcast<f32>(kept[at]));
-    s[1] = textureLoad(sums0, xy, 0);
-    s[2] = textureLoad(sums1, xy, 0);
+    s[0] = vec4f(f32(here.n), second.w, third.w, bitcast<f32>(gathered[GATHERED * p]));
+    s[1] = texel_of(sums0, p);
+    s[2] = texel_of(sums1, p);
     s[3] = vec4f(second.rgb, nearest(here));
     s[4] = vec4f(third.rgb, bitcast<f32>(here.far));
     s[5] = vec4f(vec4u(word, word >> 8u, word >> 16u, word >> 24u) & vec4u(255u)) / 255.0;
-    s[6] = vec4f(textureLoad(background, xy, 0).rgb, 0.0);
-    for (var b = 1u; b < BINS; b++) {  // bin b here is bin 16 / BINS * b of 16
-        let share = (kept[at + 1u + (b - 1u) / 8u] >> (4u * ((b - 1u) & 7u))) & 15u;
-        let j = 16u / BINS * b - 1u;
+    s[6] = vec4f(texel_of(background, p).rgb, 0.0);
+    for (var b = 1u; b < BINS; b++) {  // bin b here is bin EVERY b of 16
+        let share = (gathered[share_word(p, b)] >> share_shift(b)) & SHARE_LEVELS;
+        let j = EVERY * b - 1u;
         s[7u + j / 4u][j % 4u] = f32(share) / f32(SHARE_LEVELS);
     }
     return s;
@@ -43,7 +39,7 @@ fn sums_of(p: u32) -> array<vec4f, 11> {
 
 @compute @workgroup_size(64)
 fn predict_curves(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let p = id.y * groups.x * 64u + id.x;
+    let p = thread_of(id, groups);
     if (p >= arrayLength(&curves) || state.complete == 1u || statistics[p].n <= state.k_min) {
         return;
     }

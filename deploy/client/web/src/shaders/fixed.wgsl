@@ -4,7 +4,7 @@
 
 @compute @workgroup_size(64)
 fn place_fixed(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let p = id.y * groups.x * 64u + id.x;
+    let p = thread_of(id, groups);
     if (p < arrayLength(&offsets)) {
         offsets[p] = p * (budget / (arrayLength(&offsets) - 1u));
     }

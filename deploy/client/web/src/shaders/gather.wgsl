@@ -1,7 +1,7 @@
 // Order-independent sums over all fragments of a pixel (renderer/shaders/gather/gather.frag).
-// Integers by atomics: the optical depth and its depth bins, the nearest colour. WebGPU blends neither r32float nor
-// rgba16unorm everywhere. Half floats by blending: what else a network reads, packed into four targets, as many as
-// every device has room for.
+// Integers by atomics: the optical depth and the units of its depth bins, the nearest colour. WebGPU blends neither
+// r32float nor rgba16unorm everywhere. Half floats by blending: what else a network reads, packed into four targets, as
+// many as every device has room for.
 struct Sums {
     @location(0) rgb_x: vec4f,          // sum rgb, sum x
     @location(1) alpha_rgb_x2: vec4f,   // sum a rgb, sum x^2
@@ -10,17 +10,29 @@ struct Sums {
 }
 
 @group(2) @binding(0) var<storage, read> statistics: array<Statistics>;
-// [P][GATHERED]: optical depth in OPTICAL_ONE-ths; ~ of the nearest packed colour; units of each bin
-@group(2) @binding(1) var<storage, read_write> gathered: array<atomic<u32>>;
+@group(2) @binding(1) var<storage, read_write> gathered: array<atomic<u32>>;  // [P][GATHERED]; D in OPTICAL_ONE-ths
+
+// Adds to one of a word's halves, up to BIN_LIMIT: a sum beyond it would go on in the other half.
+fn add_to_half(at: u32, shift: u32, units: u32) {
+    var before = atomicLoad(&gathered[at]);
+    loop {
+        let room = BIN_LIMIT - ((before >> shift) & BIN_LIMIT);
+        if (room == 0u) {
+            return;
+        }
+        let tried = atomicCompareExchangeWeak(&gathered[at], before, before + (min(units, room) << shift));
+        if (tried.exchanged) {
+            return;
+        }
+        before = tried.old_value;
+    }
+}
 
 fn gather(in: Surface, stored: vec4u) -> f32 {
     let p = pixel_of(in);
     let z = depth_bits(in);
     let here = statistics[p];
-    let nearest_z = nearest(here);
-    let extent_z = extent(here);
-    let place = bin_place(bitcast<f32>(z), nearest_z, extent_z);
-    let bin = min(u32(place), BINS - 1u);
+    let x = relative_depth(bitcast<f32>(z), here);
     let optical_depth = -log(1.0 - f32(stored.a) / 255.0);
     let at = GATHERED * p;
     // Beyond OPTICAL_CEILING nothing is visible, and the sum must not wrap round.
@@ -30,13 +42,17 @@ fn gather(in: Surface, stored: vec4u) -> f32 {
     if (~z == here.near) {  // ties: the smaller packed colour
         atomicMax(&gathered[at + 1u], ~pack(stored));
     }
-    atomicAdd(&gathered[at + 2u + bin], u32(max(1.0, floor(optical_depth * OPTICAL_UNIT + 0.5))));
-    return select(0.0, (bitcast<f32>(z) - nearest_z) / extent_z, extent_z > 0.0);
+    if (BINS > 0u) {
+        let bin = min(u32(bin_place(x)), LAST_BIN);
+        let units = u32(max(1.0, floor(optical_depth * OPTICAL_UNIT + 0.5)));
+        add_to_half(at + 2u + bin / 2u, 16u * (bin & 1u), units);
+    }
+    return x;
 }
 
 // For the tail alone.
 @fragment
-fn gather_bins(in: Surface) {
+fn gather_tail(in: Surface) {
     let stored = stored_surface(in);
     if (is_hidden(in) || !is_transparent(stored)) {
         return;

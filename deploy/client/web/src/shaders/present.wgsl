@@ -31,11 +31,6 @@ fn bytes(word: u32) -> vec3f {
     return vec3f(vec3u(word, word >> 8u, word >> 16u) & vec3u(255u));
 }
 
-@vertex
-fn cover(@builtin(vertex_index) corner: u32) -> @builtin(position) vec4f {
-    return vec4f(select(-1.0, 3.0, corner == 1u), select(-1.0, 3.0, corner == 2u), 0.0, 1.0);
-}
-
 @fragment
 fn present(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let p = u32(position.y) * wanted.width + u32(position.x);

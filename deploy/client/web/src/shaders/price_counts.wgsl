@@ -9,6 +9,9 @@ var<workgroup> bin: array<atomic<u32>, EDGES>;
 
 @compute @workgroup_size(128)
 fn count_prices(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    if (is_found(state.low, state.high)) {
+        return;
+    }
     if (lane < u32(EDGES)) {
         at[lane] = price(state.edge[lane]);
     }

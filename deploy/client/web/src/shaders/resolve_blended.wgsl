@@ -6,17 +6,15 @@
 
 @compute @workgroup_size(64)
 fn resolve_blended(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let p = id.y * groups.x * 64u + id.x;
+    let p = thread_of(id, groups);
     if (p >= arrayLength(&shown)) {
         return;
     }
-    let width = textureDimensions(background).x;
-    let xy = vec2u(p % width, p / width);
-    let root = textureLoad(background, xy, 0).rgb;
-    let sum = textureLoad(sums, xy, 0);
+    let root = texel_of(background, p).rgb;
+    let sum = texel_of(sums, p);
     var colour = root * root;
     if (sum.a > 0.0) {
-        let through = exp(-textureLoad(depths, xy, 0).r);
+        let through = exp(-texel_of(depths, p).r);
         colour = (1.0 - through) * (sum.rgb / sum.a) + through * colour;
     }
     shown[p] = display_word(colour, 0u);

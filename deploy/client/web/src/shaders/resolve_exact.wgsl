@@ -6,7 +6,7 @@
 
 @compute @workgroup_size(64)
 fn resolve_exact(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let p = id.y * groups.x * 64u + id.x;
+    let p = thread_of(id, groups);
     if (p >= arrayLength(&shown)) {
         return;
     }
@@ -14,7 +14,6 @@ fn resolve_exact(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
     for (var i = offsets[p]; i < offsets[p + 1u]; i++) {
         light = behind(pool[i].x, light);
     }
-    let width = textureDimensions(background).x;
-    let root = textureLoad(background, vec2u(p % width, p / width), 0).rgb;
+    let root = texel_of(background, p).rgb;
     shown[p] = display_word(light.rgb + light.a * root * root, offsets[p + 1u] - offsets[p]);
 }

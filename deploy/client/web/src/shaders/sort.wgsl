@@ -28,7 +28,7 @@ fn sift(base: u32, count: u32, hole: u32, fragment: vec2u) {
 
 @compute @workgroup_size(64)
 fn sort_runs(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let p = id.y * groups.x * 64u + id.x;
+    let p = thread_of(id, groups);
     if (p + 1u >= arrayLength(&offsets)) {
         return;
     }

@@ -1,13 +1,16 @@
-// What the passes of an allocation tell each other (renderer/shaders/allocation/state.glsl, without a warm start).
+// What the passes of an allocation tell each other (renderer/shaders/allocation/state.glsl); `warm` and `answer` stay.
 struct State {
     fragments: u32,    // N
     occupied: u32,     // pixels with fragments
+    deepest: u32,      // fragments of the fullest pixel
     k_min: u32,        // 1 where the budget covers every occupied pixel
     complete: u32,     // 1 where it covers every fragment
     left: u32,         // budget of the open pixels: those whose k their count alone does not settle
     sure: u32,         // slots of all pixels at the price `low`
     low: i32,          // greatest index of a price known to be within the budget
     high: i32,         // an index above `low` that is beyond it, or LAST
+    warm: u32,         // 1: `answer` is the index of an earlier frame's price
+    answer: i32,
     edge: array<i32, EDGES>,  // indices of the prices that the next round counts at
 }
 
@@ -25,6 +28,11 @@ fn add2(one: vec2u, two: vec2u) -> vec2u {
 // A pixel's fragments that can have a slot: no more than one shader can visit.
 fn usable(n: u32) -> u32 {
     return min(n, TURNS);
+}
+
+// Whether the budget lies between neighbouring prices: later rounds have nothing to do.
+fn is_found(low: i32, high: i32) -> bool {
+    return high - low <= 1;
 }
 
 // Edge j of a round between two indices, evenly spread.

@@ -1,13 +1,4 @@
 // Geometry and shading, shared by every geometry pass: renderer/shaders/common/surface.{vert,glsl} in WGSL.
-struct Camera {
-    world_to_view: mat4x4f,
-    projection: mat4x4f,
-    eye_ray: vec4f,  // scale and offset from window coordinates to x/-z and y/-z in view space
-    up_view: vec4f,  // the scene's up axis in view space
-    clip: vec2f,     // near and far distance, metres
-    size: vec2u,     // width and height of the window, pixels
-}
-
 struct Material {
     scale: vec4f,    // factor of the texture's linear colour and opacity
     threshold: f32,  // opacity below which nothing is there, and from which on it is opaque; 0: it is blended
@@ -30,7 +21,6 @@ struct Corner {
     @location(2) colour: vec4f,
 }
 
-@group(0) @binding(0) var<uniform> camera: Camera;
 @group(0) @binding(1) var opaque_depth: texture_depth_2d;  // not bound while it is drawn
 @group(1) @binding(0) var<uniform> material: Material;
 @group(1) @binding(1) var colour_texture: texture_2d<f32>;
@@ -43,9 +33,8 @@ fn place(
     @location(2) uv: vec2f,
     @location(3) colour: vec4f,
 ) -> Corner {
-    let view = camera.world_to_view * vec4f(position, 1.0);
     let turned = (camera.world_to_view * vec4f(normal, 0.0)).xyz;
-    return Corner(camera.projection * view, turned, uv, colour);
+    return Corner(clip_position(position), turned, uv, colour);
 }
 
 fn pixel_of(in: Surface) -> u32 {
