@@ -11,6 +11,7 @@ from renderer.techniques.kbuffer_deep import KBufferDeep
 from renderer.techniques.kbuffer_dynamic import KBufferDynamic
 from renderer.techniques.kbuffer_importance import KBufferImportance
 from renderer.techniques.kbuffer_optimal import KBufferOptimal
+from renderer.techniques.kbuffer_temporal import KBufferTemporal
 from renderer.techniques.moment import Moment
 from renderer.techniques.multilayer import Multilayer
 from renderer.techniques.registry import TECHNIQUES, Entry, Needs, technique
@@ -33,6 +34,7 @@ __all__ = [
     "KBufferDynamic",
     "KBufferImportance",
     "KBufferOptimal",
+    "KBufferTemporal",
     "Moment",
     "Multilayer",
     "Needs",

@@ -42,16 +42,33 @@ _BINNED = 4
 _NO_TAIL = -1
 
 # Storage bindings of kbuffer/*.frag; the slots of the one-pass chain are where the colours of the other are.
-_OFFSETS, _DEPTHS, _COLOURS, _Z_MIN, _Z_MAX, _FRONT = range(6)
+_OFFSETS, _DEPTHS, _COLOURS, _Z_MIN, _Z_MAX, _FRONT, _MEMORY = range(7)
+
+
+@dataclass(frozen=True, slots=True)
+class Memory:
+    """Where resolving notes what last core fragments change.
+
+    Attributes:
+        buffer: uint32 [P], see `shaders/kbuffer-temporal/memory.glsl`.
+        defines: Of that file.
+    """
+
+    buffer: moderngl.Buffer
+    defines: Defines
 
 
 @dataclass(frozen=True, slots=True)
 class _Tail:
-    """What the tail needs: its code in the shaders, the density tail's constant, where the optical depth lies."""
+    """What the tail needs: its code in the shaders, the density tail's constant, where the optical depth lies.
+
+    `memory` is where resolving notes what last core fragments change, if anywhere.
+    """
 
     code: int
     g: float
     gathered: Gathered | None
+    memory: Memory | None = None
 
     @property
     def defines(self) -> Defines:
@@ -128,6 +145,7 @@ def draw_chain(
     gathered: Gathered | None,
     *,
     complete: bool,
+    memory: Memory | None = None,
 ) -> moderngl.Texture:
     """The passes of the chain, from slots that are on the GPU to the picture.
 
@@ -139,6 +157,7 @@ def draw_chain(
         budget: As `render_chain` has it.
         gathered: What the tail needs, from `gathered_for_tail`.
         complete: Whether every fragment is known to have a slot: then there is no tail.
+        memory: Where to note what each pixel's last core fragment changes; not with `complete`.
 
     Returns:
         RGBA32F, linear.
@@ -148,7 +167,7 @@ def draw_chain(
     """
     offsets.bind_to_storage_buffer(_OFFSETS)
     code = _BINNED if budget.tail in DENSITY_BINS else _TAIL_CODES[budget.tail]
-    tail = _Tail(_NO_TAIL if complete else code, budget.g, gathered)
+    tail = _Tail(_NO_TAIL if complete else code, budget.g, gathered, memory)
     chain = _one_pass if _is_one_pass(frame.ctx, budget, total) else _two_pass
     return chain(frame, clock, total, tail)
 
@@ -245,8 +264,19 @@ def _draw_with_tail(frame: Frame, fragment: str, tail: _Tail) -> list[moderngl.T
 
 def _resolve(frame: Frame, tail: _Tail, tails: list[moderngl.Texture], stride: int) -> moderngl.Texture:
     """Composite the bound pool (offsets, colours) over the tail and the background; RGBA32F, linear."""
-    defines = {**tail.defines, "STRIDE": stride}
-    return resolve_screen(frame, "kbuffer/resolve.frag", [frame.background, *tails], defines, first_row=0)
+    textures, defines = [frame.background, *tails], {**tail.defines, "STRIDE": stride}
+    if tail.memory is None:
+        return resolve_screen(frame, "kbuffer/resolve.frag", textures, defines, first_row=0)
+    # What falls back into the tail is weighed as the chain weighs it.
+    tail.memory.buffer.bind_to_storage_buffer(_MEMORY)
+    if tail.gathered is not None:
+        textures.append(tail.gathered.sums[0])
+    defines |= {"OBSERVE": 1, "MAX_EXPONENT": MAX_EXPONENT, **tail.memory.defines}
+    image = resolve_screen(
+        frame, "kbuffer/resolve.frag", textures, defines, first_row=0, gathered=len(textures) - 1, density_g=tail.g
+    )
+    frame.ctx.memory_barrier()
+    return image
 
 
 def resolve_all(frame: Frame, offsets: NDArray[np.int64], packed: NDArray[np.uint32]) -> NDArray[np.float32]:

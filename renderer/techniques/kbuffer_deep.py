@@ -32,6 +32,7 @@ from renderer.techniques.base import Budget, Rendered
 from renderer.techniques.chain import (
     RANGE_BYTES,
     SLOT_BYTES,
+    Memory,
     chain_bytes,
     draw_chain,
     gathered_for_tail,
@@ -128,6 +129,7 @@ class KBufferDeep:
         self._keeps_curves = keeps_curves
         self._allocation: GpuAllocation | None = None
         self._prediction: _Prediction | None = None
+        self._memory: Memory | None = None  # of a technique that learns from what it resolves
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame with predicted slots; the budget is met exactly where it is below N."""
@@ -164,7 +166,9 @@ class KBufferDeep:
             del curves
         for_tail = gathered_for_tail(frame, budget, gathered)
         read = [] if for_tail is None or for_tail.name == "gather" else [for_tail.name]
-        image = draw_chain(frame, clock, offsets, budget.fragments, budget, for_tail, complete=False)
+        image = draw_chain(
+            frame, clock, offsets, budget.fragments, budget, for_tail, complete=False, memory=self._memory
+        )
         linear = read_linear(frame, image)
         # The frame is over: what follows are its statistics.
         state = allocation.read_state()

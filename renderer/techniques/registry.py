@@ -19,6 +19,7 @@ from renderer.techniques.kbuffer_deep import Inference, KBufferDeep
 from renderer.techniques.kbuffer_dynamic import KBufferDynamic
 from renderer.techniques.kbuffer_importance import KBufferImportance
 from renderer.techniques.kbuffer_optimal import Allocate, KBufferOptimal
+from renderer.techniques.kbuffer_temporal import SETTLED, KBufferTemporal
 from renderer.techniques.moment import Moment
 from renderer.techniques.multilayer import Multilayer
 from renderer.techniques.sbuffer import SBuffer
@@ -35,7 +36,7 @@ class Needs:
     """What some techniques need besides a frame and a budget.
 
     Attributes:
-        bundle: Folder of a bundle (`kbuffer-deep`).
+        bundle: Folder of a bundle (`kbuffer-deep`, `kbuffer-temporal`).
         allocate: The allocation to render (`kbuffer-optimal`); the labeller's, which the renderer does not know.
         vkb: Factors of `kbuffer-importance`.
         inference: How `kbuffer-deep` runs its network.
@@ -60,11 +61,16 @@ class Entry:
             `approximate`: sums or a few nodes for each pixel, whatever the budget.
         about: One line for lists.
         make: Builds it.
+        needs_bundle: Whether it runs a bundle's network.
+        settles: Frames of a still camera after which its picture is what it is measured by; 1: every frame is by
+            itself.
     """
 
     family: Family
     about: str
     make: Callable[[Needs], Technique]
+    needs_bundle: bool = False
+    settles: int = 1
 
 
 def technique(name: str, needs: Needs = Needs()) -> Technique:
@@ -81,9 +87,17 @@ def technique(name: str, needs: Needs = Needs()) -> Technique:
 
 
 def _deep(needs: Needs) -> Technique:
+    return KBufferDeep(_bundle(KBufferDeep.name, needs), needs.inference)
+
+
+def _temporal(needs: Needs) -> Technique:
+    return KBufferTemporal(_bundle(KBufferTemporal.name, needs), needs.inference)
+
+
+def _bundle(name: str, needs: Needs) -> Path:
     if needs.bundle is None:
-        raise Problem("kbuffer-deep needs a bundle.", "Name the folder of one with --bundle.")
-    return KBufferDeep(needs.bundle, needs.inference)
+        raise Problem(f"{name} needs a bundle.", "Name the folder of one with --bundle.")
+    return needs.bundle
 
 
 def _optimal(needs: Needs) -> Technique:
@@ -105,7 +119,10 @@ TECHNIQUES: Mapping[str, Entry] = {
     KBufferImportance.name: Entry(
         "bounded", "k(p) by importance maps (VKB)", lambda needs: KBufferImportance(needs.vkb)
     ),
-    KBufferDeep.name: Entry("bounded", "k(p) by a bundle's network", _deep),
+    KBufferDeep.name: Entry("bounded", "k(p) by a bundle's network", _deep, needs_bundle=True),
+    KBufferTemporal.name: Entry(
+        "bounded", "k(p) by a network and the last frame", _temporal, needs_bundle=True, settles=SETTLED
+    ),
     KBufferOptimal.name: Entry("bounded", "k(p) as allocated with all fragments known", _optimal),
     WeightedAverage.name: Entry("approximate", "mean colour, mean opacity", lambda _: WeightedAverage()),
     WeightedBlended.name: Entry("approximate", "mean weighted by depth (McGuire)", lambda _: WeightedBlended()),

@@ -38,14 +38,20 @@ class Flicker:
     k: float
 
 
-def camera_path(view: View, frames: int) -> list[View]:
-    """A short orbit: the eye turns about the up axis through the target; the first view is the given one."""
+def camera_path(view: View, frames: int, step: float = STEP) -> list[View]:
+    """A short orbit: the eye turns about the up axis through the target; the first view is the given one.
+
+    Args:
+        view: Where it begins.
+        frames: Views of it.
+        step: Degrees from one to the next.
+    """
     eye, target, up = (np.array(v, dtype=np.float64) for v in (view.eye, view.target, view.up))
     axis = up / np.linalg.norm(up)
     arm = eye - target
     views = []
     for number in range(frames):
-        angle = np.radians(STEP * number)
+        angle = np.radians(step * number)
         # Rodrigues' rotation formula.
         turned = arm * np.cos(angle) + np.cross(axis, arm) * np.sin(angle) + axis * (axis @ arm) * (1 - np.cos(angle))
         x, y, z = (target + turned).tolist()

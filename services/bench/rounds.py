@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from renderer.techniques import Budget, Rendered, Technique
+from renderer.techniques import TECHNIQUES, Budget, Rendered, Technique
 from renderer.timing import Recording, recording
 from schemas.bench import CellKey, Times
 from services.bench.subject import Subject
@@ -35,12 +35,15 @@ class Run:
     def first(self, subject: Subject, limit: float) -> Rendered:
         """The warm-up, for which drivers compile shaders; one frame beyond the limit is all there will be.
 
+        Of a technique that learns from its frames, these are as many as it takes to settle, and the last one counts.
+
         Raises:
             Problem: The technique cannot render this.
         """
-        start = time.perf_counter()
-        rendered, found = shoot(subject, self.technique, self.budget)
-        self.cost = time.perf_counter() - start
+        for _ in range(TECHNIQUES[self.key.technique].settles):
+            start = time.perf_counter()
+            rendered, found = shoot(subject, self.technique, self.budget)
+            self.cost = time.perf_counter() - start
         if self.cost > limit:
             self.recordings.append(found)
         return rendered

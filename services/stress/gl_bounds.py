@@ -203,7 +203,7 @@ DEEP: Final[dict[str, Bound]] = {
 
 PATHS: Final = (
     *(name for name in BOUNDS if "," not in name and not name.startswith("bounded")),
-    *("kbuffer", "kbuffer-dynamic", "kbuffer-importance", "kbuffer-deep", "kbuffer-optimal"),
+    *("kbuffer", "kbuffer-dynamic", "kbuffer-importance", "kbuffer-deep", "kbuffer-temporal", "kbuffer-optimal"),
 )
 """What rows are called, without what comes after a dot or the driver: the bounded techniques share their bounds."""
 

@@ -130,7 +130,8 @@ def bounded_rows(
     for tail in form.tails:
         for label in case.scenery.budgets:
             fragments = BUDGETS[label](case.dump.total, occupied)
-            rendered = made.render(case.frame, Budget(fragments, tail, chain=form.chain))
+            for _ in range(min(2, TECHNIQUES[name].settles)):  # what learns from its frames has learnt in the second
+                rendered = made.render(case.frame, Budget(fragments, tail, chain=form.chain))
             wrong += [f"F = {label}, {tail}: {why}" for why in broken_limits(name, rendered, case, fragments)]
             linear, expected = rendered.linear.reshape(-1, 3), truth.hybrid(rendered.k, tail)
             row = _compared(case, f"{form.path}.{tail} · {driver}", case.pixels, linear, expected, "bounded")

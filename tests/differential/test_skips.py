@@ -18,7 +18,9 @@ from renderer.techniques.skips import EMPTY_TILES, TAIL
 from schemas.fragments import FragmentDump
 
 COUNTING = [
-    name for name in TECHNIQUES if name not in ("kbuffer-deep", "kbuffer-optimal", "weighted-average", "stochastic")
+    name
+    for name, entry in TECHNIQUES.items()
+    if not entry.needs_bundle and name not in ("kbuffer-optimal", "weighted-average", "stochastic")
 ]
 
 

@@ -110,7 +110,10 @@ def bindings(shader: str) -> set[tuple[int, str]]:
         (4, ["gather/gather.frag"]),
         (5, ["allocation/state.glsl", "allocation/count.comp"]),
         (5, ["allocation/state.glsl", "kbuffer-deep/inputs.glsl", "kbuffer-deep/curves.comp"]),
-        (7, ["kbuffer/chain.frag", "kbuffer/chain_colour.frag", "kbuffer/chain_depth.frag", "kbuffer/tail.glsl"]),
+        (
+            7,
+            ["kbuffer/chain.frag", "kbuffer/chain_colour.frag", "kbuffer/chain_depth.frag", "kbuffer/tail_weight.glsl"],
+        ),
     ],
 )
 def test_bindings_are_those_of_the_shaders(number: int, shaders: list[str]) -> None:

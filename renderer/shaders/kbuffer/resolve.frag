@@ -1,9 +1,14 @@
 #version 450
 // Core front to back, then the tail, then the background (METHOD 2). Linear RGB out.
 // TAIL: -1 none (the pool holds every fragment), else as in tail.glsl. STRIDE: words of a slot; the first is the colour.
+// OBSERVE: also note what the last core fragment changed (kbuffer-temporal/observe.glsl).
 #include "common/composite.glsl"
-#if TAIL == 4
+#ifdef OBSERVE
+#include "kbuffer/tail_weight.glsl"
+#include "kbuffer-temporal/memory.glsl"
+#elif TAIL == 4
 #include "common/depth_bins.glsl"
+layout(std430, binding = 5) readonly buffer DepthBins { uint kept[]; };  // [P, WORDS]; the first is D
 #endif
 
 layout(std430, binding = 0) readonly buffer Offsets { uint offset[]; };  // [P+1]
@@ -11,9 +16,7 @@ layout(std430, binding = 2) readonly buffer Colours { uint colour[]; };
 layout(binding = 0) uniform sampler2D background;
 #if TAIL >= 0
 layout(binding = 1) uniform sampler2D tail_colour;
-#if TAIL == 4
-layout(std430, binding = 5) readonly buffer DepthBins { uint kept[]; };  // [P, WORDS]; the first is D
-#else
+#if TAIL != 4
 layout(binding = 2) uniform sampler2D tail_opacity;
 #endif
 #endif
@@ -21,28 +24,14 @@ uniform int width;
 uniform int first_row;  // of the pool
 layout(location = 0) out vec4 out_colour;
 
-void main() {
-    if (gl_HelperInvocation) return;  // beyond the window's edge there are no offsets, and loops would go anywhere
-    ivec2 xy = ivec2(gl_FragCoord.xy);
-    int p = (xy.y - first_row) * width + xy.x;
-    vec4 light = vec4(0.0, 0.0, 0.0, 1.0);
-    for (uint i = offset[p], end = offset[p + 1]; i < end; ++i) {
-        uint word = colour[STRIDE * i];
-        if (word == EMPTY) break;  // the pixel has fewer fragments than slots
-        add_behind(word, light);
-    }
-    vec3 behind = texelFetch(background, xy, 0).rgb;
-    behind *= behind;
-#if TAIL >= 0
-    vec4 sums = texelFetch(tail_colour, xy, 0);
+// What is seen of a core with its tail's sums over the background. TAIL 4 has no `opacity`: bins have the optical depth.
+vec3 composed(int p, vec4 light, vec4 sums, vec4 opacity, vec3 behind) {
 #if TAIL == 4
     if (sums.a > 0.0) {  // T_core P is what the whole list lets through, exp(-D)
         float through = min(exp(-uintBitsToFloat(kept[WORDS * uint(p)])), light.a);
-        out_colour = vec4(light.rgb + (light.a - through) / sums.a * sums.rgb + through * behind, 1.0);
-        return;
+        return light.rgb + (light.a - through) / sums.a * sums.rgb + through * behind;
     }
-#else
-    vec4 opacity = texelFetch(tail_opacity, xy, 0);
+#elif TAIL >= 0
     if (opacity.z > 0.0) {
         vec3 average = sums.rgb / sums.a;
 #if TAIL == 0 || TAIL == 1
@@ -57,6 +46,37 @@ void main() {
 #endif
     }
 #endif
+    return light.rgb + light.a * behind;
+}
+#ifdef OBSERVE
+#include "kbuffer-temporal/observe.glsl"
 #endif
-    out_colour = vec4(light.rgb + light.a * behind, 1.0);
+
+void main() {
+    if (gl_HelperInvocation) return;  // beyond the window's edge there are no offsets, and loops would go anywhere
+    ivec2 xy = ivec2(gl_FragCoord.xy);
+    int p = (xy.y - first_row) * width + xy.x;
+    vec4 light = vec4(0.0, 0.0, 0.0, 1.0);
+    vec4 without_last = light;
+    uint begin = offset[p], i = begin;
+    for (uint end = offset[p + 1]; i < end; ++i) {
+        uint word = colour[STRIDE * i];
+        if (word == EMPTY) break;  // the pixel has fewer fragments than slots
+        without_last = light;
+        add_behind(word, light);
+    }
+    vec3 behind = texelFetch(background, xy, 0).rgb;
+    behind *= behind;
+    vec4 sums = vec4(0.0), opacity = vec4(0.0);
+#if TAIL >= 0
+    sums = texelFetch(tail_colour, xy, 0);
+#if TAIL != 4
+    opacity = texelFetch(tail_opacity, xy, 0);
+#endif
+#endif
+    vec3 seen = composed(p, light, sums, opacity, behind);
+#ifdef OBSERVE
+    if (i > begin) observe(p, i - begin, i - 1u, seen, without_last, sums, opacity, behind);
+#endif
+    out_colour = vec4(seen, 1.0);
 }

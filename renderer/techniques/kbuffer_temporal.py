@@ -1,0 +1,160 @@
+"""`kbuffer-temporal`: `kbuffer-deep` that learns from its last frame (METHOD.md 4).
+
+A resolved pixel knows what its last core fragment gained: the squared change of its displayed colour when that fragment
+is in the core instead of the tail. In the next frame, the pixel's gain curve `log gain(k) = a - b (k - 1)` is moved
+towards it before the budget is spent, which is met to the fragment as ever. Each pixel remembers in one word the sum of
+its moves, what was seen, and n.
+
+- A move is a share of what the curve was wrong by: half of it at first, a third in the next frame, and so on. With a
+  constant share, pixels jump to and fro between two k for ever; so they settle, and a still camera's picture stands
+  still after `FRAMES` frames.
+- While the camera moves, a pixel's memory stays at its place in the window. It is forgotten where n is another by more
+  than an eighth, and shares do not become smaller than a ninth. Moving memories with the nearest fragments was tried
+  on one scene, and was no better.
+- All begins anew with another scene, size, budget or bundle, and after a cut: the camera has turned or moved far, or
+  has another lens.
+
+The same frames give the same pictures, to the bit where the tail's sums are (`renderer.techniques.chain`).
+"""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import moderngl
+import numpy as np
+
+from renderer.allocation.gpu import DEFINES as ALLOCATION_DEFINES
+from renderer.allocation.gpu import FrameAllocation
+from renderer.frame import Frame, Gathered
+from renderer.gpu_scene import GpuScene, set_uniforms
+from renderer.programs import Defines
+from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.chain import Memory
+from renderer.techniques.kbuffer_deep import Inference, KBufferDeep
+from schemas.problem import ExitCode, Problem
+from schemas.view import View
+
+SETTLED: Final = 9
+"""Frames of a still camera after which the error hardly falls (docs/TECHNIQUES.md)."""
+CORRECTION_STEPS: Final = 16
+"""Steps of a correction in a unit of log gain: up to 127 of them, 8 units."""
+SEEN_STEPS: Final = 8
+"""Steps of a seen log gain in a unit."""
+SEEN_LEAST: Final = -28
+"""Log gains below this are taken for it: a change of the colour by 1e-6, the rounding of float32."""
+MOST_WRONG: Final = 3.0
+"""Most of what a curve is wrong by that one frame is believed."""
+FRAMES: Final = 15
+"""Frames that correct a pixel of a still camera."""
+MOVING_FRAMES: Final = 7
+"""Frames that a pixel counts at most while the camera moves."""
+CUT_DEGREES: Final = 6.0
+"""A camera that turns by more than this from one frame to the next has not moved there."""
+CUT_SHARE: Final = 0.05
+"""Nor has one whose eye is farther away than this share of the diagonal of the scene's bounds."""
+MEMORY_BYTES: Final = 4
+"""Bytes a pixel, from frame to frame."""
+
+DEFINES: Final[Defines] = {
+    **{"CORRECTION_STEPS": CORRECTION_STEPS, "SEEN_STEPS": SEEN_STEPS, "SEEN_LEAST": SEEN_LEAST, "FRAMES": FRAMES},
+    **{"MOVING_FRAMES": MOVING_FRAMES, "MOST_WRONG": MOST_WRONG},
+}
+"""Of `kbuffer-temporal/*`."""
+
+# Storage bindings of kbuffer-temporal/correct.comp.
+_STATE, _MEMORY, _CURVES, _COUNTS = 0, 2, 5, 6
+
+
+@dataclass(frozen=True, slots=True)
+class _Past:
+    """What the memory was made for: with anything else it begins anew."""
+
+    gpu: weakref.ref[GpuScene]
+    size: tuple[int, int]
+    budget: Budget
+    view: View
+    memory: moderngl.Buffer
+
+    def serves(self, frame: Frame, budget: Budget) -> bool:
+        """Whether a frame may go on with it."""
+        if (self.gpu(), self.size, self.budget) != (frame.gpu, (frame.width, frame.height), budget):
+            return False
+        low, high = frame.gpu.scene.bounds
+        return not is_cut(self.view, frame.view, float(np.linalg.norm(high - low)))
+
+
+def is_cut(before: View, after: View, extent: float) -> bool:
+    """Whether a camera is elsewhere rather than moved.
+
+    Args:
+        before: Of the last frame.
+        after: Of this one.
+        extent: Metres across the scene.
+    """
+    lenses = ((view.fov, view.ortho_height, view.shift) for view in (before, after))
+    if next(lenses) != next(lenses):
+        return True
+    # The trace of a rotation is 1 + 2 cos(angle).
+    turn = np.trace(before.world_to_view()[:3, :3] @ after.world_to_view()[:3, :3].T)
+    moved = np.linalg.norm(np.subtract(before.eye, after.eye))
+    return bool(turn < 1.0 + 2.0 * np.cos(np.radians(CUT_DEGREES)) or moved > CUT_SHARE * extent)
+
+
+class KBufferTemporal(KBufferDeep):
+    """The learned allocation, corrected from frame to frame.
+
+    Args:
+        bundle: Folder of a bundle; its hashes are verified.
+        inference: As `KBufferDeep` has it; only curves that GLSL predicts can be corrected.
+
+    Raises:
+        Problem: The bundle is damaged or not understood.
+    """
+
+    name = "kbuffer-temporal"
+
+    def __init__(self, bundle: Path, inference: Inference = "glsl") -> None:
+        super().__init__(bundle, inference)
+        self._past: _Past | None = None
+        self._still = False
+
+    def render(self, frame: Frame, budget: Budget) -> Rendered:
+        """Render the next frame; the first one is that of `kbuffer-deep`.
+
+        Raises:
+            Problem: There are no gain curves on the GPU.
+        """
+        if self._solver == "cpu":
+            raise Problem(
+                f"{self.name} corrects gain curves on the GPU, which this bundle or --inference does not leave there.",
+                "Use kbuffer-deep, or a bundle with gain curves and --inference glsl.",
+                ExitCode.LIMIT,
+            )
+        past = self._past
+        if past is None or not past.serves(frame, budget):
+            memory = frame.buffer(MEMORY_BYTES // 4 * frame.pixels, 0)
+            past = _Past(weakref.ref(frame.gpu), (frame.width, frame.height), budget, frame.view, memory)
+        self._still, self._memory = past.view == frame.view, Memory(past.memory, DEFINES)
+        self._past = replace(past, view=frame.view)
+        rendered = super().render(frame, budget)
+        return replace(
+            rendered,
+            pixel_bytes=rendered.pixel_bytes + MEMORY_BYTES,
+            early_bytes=rendered.early_bytes + MEMORY_BYTES,
+        )
+
+    def _curves(self, frame: Frame, gathered: Gathered, allocation: FrameAllocation) -> moderngl.Buffer:
+        """What the network predicts, corrected by what was seen of the last frame."""
+        curves = super()._curves(frame, gathered, allocation)
+        assert self._memory is not None, "render is before"
+        bound = {_MEMORY: self._memory.buffer, _CURVES: curves, _COUNTS: frame.depth_range()[0]}
+        for binding, buffer in bound.items():
+            buffer.bind_to_storage_buffer(binding)
+        program = frame.gpu.programs.compute("kbuffer-temporal/correct.comp", {**ALLOCATION_DEFINES, **DEFINES})
+        set_uniforms(program, {"pixels": frame.pixels, "still": int(self._still)})
+        allocation.run_pixels(program, _STATE)
+        return curves

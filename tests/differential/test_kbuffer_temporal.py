@@ -1,0 +1,224 @@
+"""`kbuffer-temporal` frame by frame against `kbuffer-deep`, its float64 twin, and the numbers of pixels it has seen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import moderngl
+import numpy as np
+import pytest
+from support.scenes import SIZE, VIEW, shells
+from support.training import export_random, random_weights
+
+from benchmarks.temporal import SHOWN, STEPS, measure, page
+from labeller.curves import composite, error_curves
+from renderer.allocation.fill import feasible_k_min
+from renderer.allocation.lattice import curves_of, solve_on_lattice
+from renderer.features import derive, gather
+from renderer.frame import Frame
+from renderer.gpu_scene import GpuScene
+from renderer.reference import temporal as twin
+from renderer.techniques import Budget, KBufferDeep, KBufferTemporal
+from renderer.techniques.chain import one_pass_available
+from renderer.techniques.kbuffer_temporal import FRAMES, MEMORY_BYTES, SETTLED
+from schemas.bundle import load_manifest
+from schemas.fragments import FragmentDump
+from schemas.problem import ExitCode, Problem
+from schemas.tail import TailName
+from schemas.view import View
+from services.bench.measure import over
+from services.bench.subject import Subject
+from services.stress.gl_network import random_networks
+from services.stress.predictors import networks, real_features
+
+SMALL = (64, 48)
+"""Where many frames are rendered."""
+
+
+def turned(number: int) -> View:
+    """The camera a little further on."""
+    x, y, z = VIEW.eye
+    further: View = VIEW.model_copy(update={"eye": (x + 0.02 * number, y, z)})
+    return further
+
+
+@pytest.fixture(scope="module")
+def gpu(gl: moderngl.Context) -> GpuScene:
+    return GpuScene(gl, shells())
+
+
+@pytest.fixture(scope="module")
+def bundle(dump: FragmentDump, gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("bundle")
+    export_random(folder, random_weights(11), derive(gather(dump))[dump.counts > 0], gl)
+    return folder
+
+
+def memory_of(technique: KBufferTemporal) -> twin.Remembered:
+    assert technique._past is not None
+    return twin.unpacked(np.frombuffer(technique._past.memory.read(), dtype=np.uint32))
+
+
+def fragments_of(dump: FragmentDump, share: float) -> int:
+    return int(share * dump.total)
+
+
+@pytest.mark.parametrize("tail", ["density-16", "density-8", "density", "exact-coverage", "weighted-average", "paper"])
+@pytest.mark.parametrize("form", ["one-pass", "two-pass"])
+def test_first_frame_is_that_of_kbuffer_deep_and_sees_what_last_fragments_change(
+    gpu: GpuScene, bundle: Path, dump: FragmentDump, tail: TailName, form: str
+) -> None:
+    if form == "one-pass" and not one_pass_available(gpu.ctx):
+        pytest.skip("this driver has no 64-bit atomics")
+    budget = Budget(fragments_of(dump, 0.3), tail, chain="one-pass" if form == "one-pass" else "two-pass")
+    temporal = KBufferTemporal(bundle)
+    first = temporal.render(Frame(gpu, VIEW, *SIZE), budget)
+    plain = KBufferDeep(bundle).render(Frame(gpu, VIEW, *SIZE), budget)
+    assert np.array_equal(first.linear, plain.linear)
+    assert np.array_equal(first.k, plain.k)
+    assert first.pixel_bytes == plain.pixel_bytes + MEMORY_BYTES
+    assert first.early_bytes == plain.early_bytes + MEMORY_BYTES
+
+    is_open = dump.counts > feasible_k_min(dump.counts, budget.fragments)
+    zero = np.zeros(dump.pixels)
+    _, before = twin.corrected(twin.nothing(dump.pixels), zero, zero + 1.0, dump.counts, is_open, still=False)
+    fewer = np.maximum(first.k - 1, 0)
+    pictures = (composite(dump, k, tail, budget.g).astype(np.float64) for k in (first.k, fewer))
+    expected, found = twin.observed(before, first.k, *pictures), memory_of(temporal)
+    for field in ("is_open", "correction", "k", "frames", "n"):
+        assert np.array_equal(getattr(found, field), getattr(expected, field)), field
+    # A change of the colour below 1e-4 is found by subtraction in float32.
+    clear = expected.seen > 80
+    assert clear.any()
+    apart = np.abs(found.seen - expected.seen)
+    assert apart[clear].max() <= 1
+    assert (apart[clear] == 0).mean() > 0.97
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_next_frames_are_those_of_the_twin(gpu: GpuScene, bundle: Path, moves: bool) -> None:
+    temporal, deep = KBufferTemporal(bundle), KBufferDeep(bundle)
+    budget = Budget(3 * SIZE[0] * SIZE[1] // 2)
+    before, learnt = None, 0
+    for number in range(4):
+        frame = Frame(gpu, turned(number if moves else 0), *SIZE)
+        rendered = temporal.render(frame, budget)
+        n = frame.count()
+        k_min = feasible_k_min(n, budget.fragments)
+        assert rendered.captured == budget.fragments
+        assert (rendered.k >= np.minimum(n, k_min)).all()
+        assert (rendered.k <= n).all()
+        found = memory_of(temporal)
+        if before is not None:
+            is_open = n > k_min
+            a, b = np.zeros(frame.pixels), np.ones(frame.pixels)
+            listed = np.flatnonzero(is_open).astype(np.uint32)
+            a[listed], b[listed] = deep.predict(frame, listed).T
+            expected_a, expected = twin.corrected(before, a, b, n, is_open, still=not moves)
+            assert np.array_equal(found.is_open, is_open)
+            for field in ("correction", "frames", "n"):
+                apart = np.abs(getattr(found, field) - getattr(expected, field))
+                assert apart.max() <= (field == "correction"), field
+                assert (apart == 0).mean() > 0.99, field
+            k = solve_on_lattice(curves_of(expected_a, b), n, budget.fragments).k
+            assert (rendered.k == k).mean() > 0.99
+            learnt += int(np.count_nonzero(found.correction))
+        before = found
+    assert learnt > 1000
+
+
+def test_it_learns_and_then_stands_still(gpu: GpuScene, bundle: Path, dump: FragmentDump) -> None:
+    curves = error_curves(dump, "density-16")
+    temporal, budget = KBufferTemporal(bundle), Budget(fragments_of(dump, 0.3))
+    errors, ks = [], []
+    for _ in range(FRAMES + 3):
+        rendered = temporal.render(Frame(gpu, VIEW, *SIZE), budget)
+        errors.append(curves.total(rendered.k))
+        ks.append(rendered.k)
+    assert errors[SETTLED - 1] < 0.9 * errors[0]
+    assert np.array_equal(ks[-1], ks[-2])
+    found = memory_of(temporal)
+    assert found.frames[found.k > 0].max() == FRAMES
+
+
+def test_the_same_frames_are_the_same_pictures(gpu: GpuScene, bundle: Path) -> None:
+    budget = Budget(SMALL[0] * SMALL[1])
+
+    def pictures() -> list[bytes]:
+        temporal = KBufferTemporal(bundle)
+        return [temporal.render(Frame(gpu, turned(i), *SMALL), budget).linear.tobytes() for i in (0, 0, 1, 2)]
+
+    first = pictures()
+    assert len(set(first)) == len(first)
+    assert pictures() == first
+
+
+def test_it_begins_anew_with_whatever_is_another(gpu: GpuScene, bundle: Path, gl: moderngl.Context) -> None:
+    temporal, deep = KBufferTemporal(bundle), KBufferDeep(bundle)
+    one, two = Budget(SMALL[0] * SMALL[1]), Budget(SMALL[0] * SMALL[1] + 500)
+    other = GpuScene(gl, shells(layers=4))
+    turns = [
+        (gpu, VIEW, SMALL, one, "first"),
+        (gpu, VIEW, SMALL, two, "budget"),
+        (gpu, VIEW, SMALL, Budget(two.fragments, "density"), "tail"),
+        (gpu, VIEW, (48, 64), Budget(two.fragments, "density"), "size, of as many pixels"),
+        (other, VIEW, (48, 64), Budget(two.fragments, "density"), "scene"),
+        (other, turned(50), (48, 64), Budget(two.fragments, "density"), "view, after a cut"),
+    ]
+    for scene, view, size, budget, what in turns:
+        new = temporal.render(Frame(scene, view, *size), budget).k
+        assert np.array_equal(new, deep.render(Frame(scene, view, *size), budget).k), what
+        again = temporal.render(Frame(scene, view, *size), budget).k
+        assert not np.array_equal(new, again), what
+
+
+def test_all_fragments_are_the_exact_picture(gpu: GpuScene, bundle: Path, dump: FragmentDump) -> None:
+    temporal, deep, budget = KBufferTemporal(bundle), KBufferDeep(bundle), Budget(dump.total + 1)
+    for _ in range(2):
+        rendered = temporal.render(Frame(gpu, VIEW, *SIZE), budget)
+        assert np.array_equal(rendered.linear, deep.render(Frame(gpu, VIEW, *SIZE), budget).linear)
+        assert not memory_of(temporal).is_open.any()
+
+
+def test_curves_that_are_no_numbers_stay_within_the_budget(
+    gpu: GpuScene, gl: moderngl.Context, dump: FragmentDump, tmp_path: Path
+) -> None:
+    weights = next(iter(networks(0, real_features(np.random.default_rng(0), 50)).values()))
+    temporal = KBufferTemporal(random_networks(tmp_path, weights, "here").overflowing)
+    for fragments in (0, int(np.count_nonzero(dump.counts)) - 1, dump.total // 3, dump.total - 1):
+        for _ in range(2):
+            rendered = temporal.render(Frame(gpu, VIEW, *SIZE), Budget(fragments, "density"))
+            assert rendered.captured == fragments
+            assert np.isfinite(rendered.linear).all()
+        assert np.abs(memory_of(temporal).correction).max() <= twin.LARGEST
+
+
+def test_without_curves_on_the_gpu_there_is_nothing_to_correct(
+    gpu: GpuScene, bundle: Path, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path
+) -> None:
+    weights = random_weights(5, ("log_n",), (8,), "importance", ("importance",))
+    export_random(tmp_path, weights, derive(gather(dump))[dump.counts > 0], gl)
+    for temporal in (KBufferTemporal(tmp_path), KBufferTemporal(bundle, "onnx")):
+        with pytest.raises(Problem, match="corrects gain curves on the GPU") as caught:
+            temporal.render(Frame(gpu, VIEW, *SMALL), Budget(1000))
+        assert caught.value.code == ExitCode.LIMIT
+
+
+def test_the_benchmark_measures_the_frames_that_it_names(gpu: GpuScene, bundle: Path) -> None:
+    subject = Subject(gpu, VIEW, SMALL)
+    fragments = fragments_of(subject.dump, 0.4)
+    found = measure(subject, fragments, bundle)
+    tail = load_manifest(bundle).tail
+    budget, technique = Budget(fragments, tail.name, tail.g), KBufferTemporal(bundle)
+    errors = []
+    for _ in range(max(SHOWN) + 1):
+        linear = technique.render(subject.frame(), budget).linear
+        errors.append(subject.reference.display_error(linear.reshape(-1, 3)))
+    assert len(set(errors)) > 1
+    assert found["still"] == pytest.approx({str(frame): over(errors[frame], errors[0]) for frame in SHOWN}, rel=1e-4)
+    for step in STEPS:
+        moving = found["moving"][str(step)]
+        assert min(moving["error"], moving["flicker"], *moving["k"]) > 0.0
+    rows = [{"scene": "shells", "budget_factor": 0.5, **found}]
+    table = page({"command": "c", "machine": {}, "bundle": "b", "created": "now", "rows": rows})
+    assert f"| shells | 0.5 | {found['still']['1']:.2f} |" in table
