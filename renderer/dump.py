@@ -17,7 +17,10 @@ from schemas.problem import ExitCode, Problem
 _CHUNK = 1 << 20
 """Elements of a chunk: enough to compress well in few files, few enough that one pixel is read in milliseconds."""
 
-_ARRAYS = ("rgba", "depth", "background", "facing")
+GROUP = "fragments.zarr"
+"""Folder of the group."""
+ARRAYS = ("rgba", "depth", "background", "facing")
+"""Arrays of the group beside the counts: two with an element for each fragment, two with one for each pixel."""
 
 
 def write_dump(folder: Path, dump: FragmentDump, about: Mapping[str, Any] | None = None) -> None:
@@ -28,10 +31,10 @@ def write_dump(folder: Path, dump: FragmentDump, about: Mapping[str, Any] | None
         dump: The fragments of a view.
         about: Further attributes of the group, JSON: what the view was.
     """
-    group = zarr.open_group(folder / "fragments.zarr", mode="w")
+    group = zarr.open_group(folder / GROUP, mode="w")
     group.attrs.update({**(about or {}), "width": dump.width, "height": dump.height})
     _write(group, "counts", dump.counts.astype(np.uint32))
-    for name in _ARRAYS:
+    for name in ARRAYS:
         _write(group, name, getattr(dump, name))
 
 
@@ -42,71 +45,23 @@ def read_dump(folder: Path) -> FragmentDump:
         Problem: There is none, or its arrays do not fit together.
     """
     try:
-        group = zarr.open_group(folder / "fragments.zarr", mode="r")
-        width, height = _size(group)
-        offsets, *arrays = _offsets(group), *(np.asarray(group[name]) for name in _ARRAYS)
-    except _DAMAGE as reason:
-        raise _damaged(folder) from reason
+        group = zarr.open_group(folder / GROUP, mode="r")
+        width, height = size_of(group)
+        offsets, *arrays = _offsets(group), *(np.asarray(group[name]) for name in ARRAYS)
+    except DAMAGE as reason:
+        raise damaged(folder) from reason
     dump = FragmentDump(width, height, offsets, *arrays)
     if len(offsets) - 1 != dump.pixels or not len(dump.rgba) == dump.total == offsets[-1]:
-        raise _damaged(folder)
+        raise damaged(folder)
     return dump
 
 
-class DumpReader:
-    """Single pixels of a dump on disk: of its fragments only the chunks are read that hold the pixel's.
-
-    Args:
-        folder: As of `read_dump`.
-
-    Attributes:
-        width: Pixels per row.
-        height: Rows.
-
-    Raises:
-        Problem: There is no dump, or its arrays do not fit together.
-    """
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        try:
-            group = zarr.open_group(folder / "fragments.zarr", mode="r")
-            self.width, self.height = _size(group)
-            self._offsets, self._arrays = _offsets(group), [_array(group, name) for name in _ARRAYS]
-        except _DAMAGE as reason:
-            raise _damaged(folder) from reason
-        lengths, pixels = [array.shape[0] for array in self._arrays], self.width * self.height
-        if len(self._offsets) - 1 != pixels or lengths != [self._offsets[-1], self._offsets[-1], pixels, pixels]:
-            raise _damaged(folder)
-
-    @property
-    def bytes(self) -> int:
-        """Memory that it holds."""
-        return self._offsets.nbytes
-
-    def pixel(self, p: int) -> FragmentDump:
-        """The dump of one pixel, width and height 1.
-
-        Args:
-            p: Its index, y * width + x.
-
-        Raises:
-            Problem: The fragments are not there any more.
-        """
-        first, end = (int(offset) for offset in self._offsets[p : p + 2])
-        parts = (slice(first, end), slice(first, end), slice(p, p + 1), slice(p, p + 1))
-        rgba, *others = (np.asarray(array[part]) for array, part in zip(self._arrays, parts, strict=True))
-        # zarr reads zeros where a chunk is missing; no fragment is stored with alpha 0.
-        if not rgba[:, 3].all():
-            raise _damaged(self._folder)
-        return FragmentDump(1, 1, np.array([0, end - first], dtype=np.int64), rgba, *others)
-
-
-_DAMAGE = (KeyError, FileNotFoundError, ValueError)
+DAMAGE = (KeyError, FileNotFoundError, ValueError)
 """What reading a group raises that is not as it was written."""
 
 
-def _size(group: zarr.Group) -> tuple[int, int]:
+def size_of(group: zarr.Group) -> tuple[int, int]:
+    """Width and height of the view."""
     return int(str(group.attrs["width"])), int(str(group.attrs["height"]))
 
 
@@ -115,13 +70,6 @@ def _offsets(group: zarr.Group) -> NDArray[np.int64]:
     offsets = np.zeros(len(counts) + 1, dtype=np.int64)
     np.cumsum(counts, out=offsets[1:])
     return offsets
-
-
-def _array(group: zarr.Group, name: str) -> zarr.Array[Any]:
-    found = group[name]
-    if not isinstance(found, zarr.Array):
-        raise KeyError(name)
-    return found
 
 
 def _write(group: zarr.Group, name: str, array: NDArray[np.generic]) -> None:
@@ -133,7 +81,6 @@ def _write(group: zarr.Group, name: str, array: NDArray[np.generic]) -> None:
         made[:] = array
 
 
-def _damaged(folder: Path) -> Problem:
-    return Problem(
-        f"The fragment dump in {folder} is damaged.", "Delete that folder: it is rendered again.", ExitCode.CONFLICT
-    )
+def damaged(where: object) -> Problem:
+    """What is said of a dump that is not as it was written."""
+    return Problem(f"The fragment dump in {where} is damaged.", "Remove it: it is rendered again.", ExitCode.CONFLICT)

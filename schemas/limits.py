@@ -25,6 +25,8 @@ class Limits:
     """Budgets of a job."""
     views: int = 1000
     """Views of a scene."""
+    view_name: int = 200
+    """Characters of the name of a view: it is part of addresses."""
     scenes: int = 1000
     """Scenes of a job."""
     steps: int = 1_000_000

@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from schemas.tail import TailName
+from schemas.view import View
 
 
 class _Record(BaseModel):
@@ -21,6 +22,8 @@ class Measurement(_Record):
     Attributes:
         scene: Label of the scene.
         view: Name of the view.
+        camera: The view itself, which its name alone does not tell: sampled views are numbered. None: it was measured
+            before cameras were recorded.
         technique: Name of the technique, e.g. `kbuffer-deep`.
         budget: F, fragments of a frame.
         budget_factor: F / (width * height).
@@ -49,6 +52,7 @@ class Measurement(_Record):
 
     scene: str
     view: str
+    camera: View | None = None
     technique: str
     budget: int = Field(gt=0)
     budget_factor: float = Field(gt=0.0)

@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
+from schemas.limits import LIMITS
+
 Vec3 = tuple[float, float, float]
 
 
@@ -40,7 +42,7 @@ class View(BaseModel):
     """A camera. Right-handed, looks along -z of its own frame; depth is the distance along that axis.
 
     Attributes:
-        name: Unique in its scene.
+        name: Unique in its scene, at most `LIMITS.view_name` characters.
         eye: Position, metres, relative to the scene's origin, stage axes.
         target: A point on the view axis.
         up: Up direction, not parallel to the view axis.
@@ -54,7 +56,7 @@ class View(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    name: str
+    name: str = Field(max_length=LIMITS.view_name)
     eye: Vec3
     target: Vec3
     up: Vec3

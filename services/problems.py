@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -272,10 +273,36 @@ class Refusal(Exception):
         )
 
 
+# A path up to a name in it: from the root, when it may have spaces in it; or from anywhere, when it is one word.
+_FROM_ROOT = r"(?<![^\s'\"(\[])(?:/[^'\"\n]*?)?"
+_TO = rf"(?:{_FROM_ROOT}|[^\s'\"(\[]*?)"
+_HEX = "[0-9a-f]"
+_PATHS = (
+    (rf"{_TO}/([a-z][a-z0-9-]{{0,31}})/{_HEX}{{2}}/({_HEX}{{64}})(?!{_HEX})", r"\1/\2"),  # artifacts and blobs
+    (rf"{_TO}/sources/\.?{_HEX}{{64}}(?:-{_HEX}{{32}})?/", ""),  # files of scenes and bundles, as these name them
+    (rf"{_TO}/sources/({_HEX}{{64}})(?!{_HEX})", r"\1"),
+    (rf"{_FROM_ROOT}/(?:tmp|scratch|checkpoints)/(?:[^\s'\"/]+/)*", ""),
+    # An error of the operating system: what is wrong, without the file.
+    (r"(\[Errno -?\d+\] [^:\n]*)(?:(?:: | -> )(?:'[^'\n]*'|\"[^\"\n]*\"))+", r"\1"),
+)
+_PATTERNS = tuple((re.compile(pattern), instead) for pattern, instead in _PATHS)
+
+
+def without_paths(text: str) -> str:
+    """A text with the names of artifacts and of a scene's files instead of where they lie on a machine of the service.
+
+    Args:
+        text: Words of a problem, of this machine or another one's: only the layout of the folders is known.
+    """
+    for pattern, instead in _PATTERNS:
+        text = pattern.sub(instead, text)
+    return text
+
+
 def refusal_of(problem: Problem) -> Refusal:
-    """A problem of the other layers as the API's answer."""
+    """A problem of the other layers as the API's answer: it names no folder of the service."""
     slug = problem.slug if isinstance(problem, RejectedScene) else _OF_CODE.get(problem.code, "internal")
-    return Refusal(slug, problem.title, problem.remedy)
+    return Refusal(slug, without_paths(problem.title), without_paths(problem.remedy))
 
 
 def document_of(problem: Problem) -> ProblemDocument:

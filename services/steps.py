@@ -140,7 +140,8 @@ def _map(runner: Runner, stage: StageName, asked: Sequence[Task]) -> list[Facts 
 
 def _measurements(view: LabelledView, facts: Facts | None) -> list[Measurement]:
     records = [] if facts is None else facts["measurements"]
-    return [Measurement.model_validate({**record, "scene": view.scene.label}) for record in records]
+    about = {"scene": view.scene.label, "camera": view.rendered.view}
+    return [Measurement.model_validate({**record, **about}) for record in records]
 
 
 def _entry(scene: PlannedScene, facts: Facts) -> SceneEntry:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import moderngl
 import pytest
 from hypothesis import settings
+from support.browser import CHROMIUM, browser
 from support.postgres import Postgres
 from support.s3 import S3Server, environment
 
@@ -92,3 +94,13 @@ def machine(request: pytest.FixtureRequest, tmp_path: Path) -> Machine:
     """Opens one storage as a machine of the given name does: every test that asks for it runs on both kinds."""
     shared = str(tmp_path / "store") if request.param == "folder" else request.getfixturevalue("s3_url")
     return lambda name: open_storage(Settings(state=tmp_path / name, store=shared))
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A headless browser."""
+    pytest.importorskip("playwright.sync_api")
+    if CHROMIUM is None:
+        pytest.skip("chromium is not installed")
+    with browser(tmp_path_factory.mktemp("browser")) as started:
+        yield started

@@ -12,6 +12,8 @@ from pxr import Usd, UsdGeom
 from renderer.usd.drivers import floats_of
 from renderer.usd.stage import WarningLog
 from renderer.usd.transforms import Transforms
+from schemas.limits import LIMITS
+from schemas.problem import ExitCode, Problem
 from schemas.view import View
 
 APERTURE_UNIT = 0.1
@@ -50,22 +52,34 @@ def read_cameras(
         origin: float64 [3], metres, stage space; views are relative to it.
         metres: Metres per stage unit.
         log: Gets a line for every camera that cannot be used.
+
+    Raises:
+        Problem: The name of one is too long for a view's.
     """
     transforms = Transforms(time, log)
     cameras: list[StageCamera] = []
     for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         if not prim.IsA(UsdGeom.Camera):
             continue
-        view = _view(UsdGeom.Camera(prim), transforms.to_world(prim), time, origin, metres, log)
+        name = _name(prim, {camera.view.name for camera in cameras})
+        view = _view(UsdGeom.Camera(prim), name, transforms.to_world(prim), time, origin, metres, log)
         if view is not None:
-            taken = {camera.view.name for camera in cameras}
-            number = 2
-            name = view.name
-            while name in taken:
-                name, number = f"{view.name}{number}", number + 1
-            view = view.model_copy(update={"name": name})
             cameras.append(StageCamera(str(prim.GetPath()), view, _aspect(UsdGeom.Camera(prim), time)))
     return tuple(cameras)
+
+
+def _name(prim: Usd.Prim, taken: set[str]) -> str:
+    own = name = str(prim.GetName())
+    number = 2
+    while name in taken:
+        name, number = f"{own}{number}", number + 1
+    if len(name) > LIMITS.view_name:
+        raise Problem(
+            f"The camera {own[:40]}... has a name of {len(own)} characters.",
+            f"Rename it: the name of a view has at most {LIMITS.view_name}.",
+            ExitCode.LIMIT,
+        )
+    return name
 
 
 def _aspect(camera: UsdGeom.Camera, time: Usd.TimeCode) -> float:
@@ -77,6 +91,7 @@ def _aspect(camera: UsdGeom.Camera, time: Usd.TimeCode) -> float:
 
 def _view(
     camera: UsdGeom.Camera,
+    name: str,
     matrix: NDArray[np.float64],
     time: Usd.TimeCode,
     origin: NDArray[np.float64],
@@ -107,7 +122,7 @@ def _view(
     target = eye - back * (distance if distance > 1e-6 * away else max(away, 1e-3))
     near, far = _clipping(camera, time, metres, log)
     return View(
-        name=str(camera.GetPrim().GetName()),
+        name=name,
         eye=_vec3(eye),
         target=_vec3(target),
         up=_vec3(up),

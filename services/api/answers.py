@@ -23,17 +23,15 @@ from schemas.service import (
     TaskRecord,
     VersionRecord,
 )
+from services.api.parts import PRINTED
 from services.problems import ProblemType
 
 HASHES_PER_REQUEST = 4096
 
-_PRINTED = r"^[^\x00-\x1f\x7f]*$"
-"""Texts of one line without control characters."""
-
 Hash = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
-Title = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=_PRINTED)]
-FilePath = Annotated[str, StringConstraints(min_length=1, max_length=512, pattern=_PRINTED)]
-Reason = Annotated[str, StringConstraints(min_length=1, max_length=1000, pattern=_PRINTED)]
+Title = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=PRINTED)]
+FilePath = Annotated[str, StringConstraints(min_length=1, max_length=512, pattern=PRINTED)]
+Reason = Annotated[str, StringConstraints(min_length=1, max_length=1000, pattern=PRINTED)]
 VersionOrAlias = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9.-]{0,39}$")]
 
 

@@ -17,6 +17,7 @@ from starlette.requests import ClientDisconnect
 
 from schemas.problem import Problem
 from services.api.routes import methods_of
+from services.api.wording import faults, sentence
 from services.problems import MEDIA_TYPE, Refusal, refusal_of
 
 _ERRORS = 20
@@ -105,11 +106,7 @@ def install(app: FastAPI, answer: Answer = answer) -> None:
 
 def _invalid(errors: Sequence[Any]) -> Refusal:
     """Only places and rules, never what was sent."""
-    places = [
-        {"at": ".".join(str(part) for part in error["loc"])[:_LENGTH], "message": str(error["msg"])[:_LENGTH]}
-        for error in errors[:_ERRORS]
-    ]
     if errors and all(error["loc"][:1] == ("path",) for error in errors):
         return Refusal("not-found", "The address names nothing: an id in it is not of the right form.")
-    first = places[0] if places else {"at": "", "message": ""}
-    return Refusal("invalid", f"{first['at']}: {first['message']}"[:_LENGTH], errors=places)
+    places = faults(errors[:_ERRORS])
+    return Refusal("invalid", sentence(places[0]) if places else "", errors=places)

@@ -26,7 +26,10 @@ NamePath = Annotated[str, Path(pattern=r"^[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?$"
 AliasPath = Annotated[str, Path(pattern=r"^[a-z][a-z0-9-]{0,39}$")]
 VersionPath = Annotated[str, Path(pattern=r"^[A-Za-z0-9][A-Za-z0-9.-]{0,39}$")]
 
-Text = Annotated[str, Query(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
+PRINTED = r"^[^\x00-\x1f\x7f]*$"
+"""Texts of one line without control characters."""
+
+Text = Annotated[str, Query(min_length=1, max_length=200, pattern=PRINTED)]
 """A text in a query; databases take no NUL."""
 
 NameQuery = Annotated[str | None, Query(pattern=r"^[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?$")]

@@ -250,8 +250,8 @@ def refusal(response: httpx.Response) -> RefusedRequest:
         document = found if isinstance(found, dict) else {}
     code = _code(response.status_code, document)
     title = str(document.get("detail") or document.get("title") or f"The server answered {response.status_code}.")
-    places = [_place(error) for error in document.get("errors") or () if isinstance(error, dict)]
-    if unsaid := [place for place in places if place not in title]:
+    errors = [error for error in document.get("errors") or () if isinstance(error, dict)]
+    if unsaid := [_place(error) for error in errors if str(error.get("message", "")) not in title]:
         title = f"{title.rstrip('.')}: {'; '.join(unsaid)}."
     if request_id := document.get("request_id"):
         title = (

@@ -12,14 +12,15 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.background import BackgroundTask
 
+from schemas.limits import LIMITS
 from schemas.service import SceneRecord
 from services.api.etags import is_current
-from services.api.parts import Services
-from services.dashboard.kept import Kept
+from services.api.parts import PRINTED, Services
 from services.dashboard.page import PageRoute, render
 from services.dashboard.picturing import Picturing
 from services.dashboard.pixels import MOST_ROWS, Inspector, Looked
 from services.dashboard.sides import Place, Side, measured_scenes, place, views, where_measured
+from services.kept import Kept
 from services.problems import Refusal
 from services.service import Service
 from services.store import MissingArtifact
@@ -28,11 +29,13 @@ from services.summary import BUNDLE
 router = APIRouter(prefix="/compare", route_class=PageRoute, include_in_schema=False)
 
 KEPT_BYTES = 128 << 20
-"""Offsets of dumps, maps of k and FLIP maps that a process keeps in memory."""
+"""Parts of dumps and allocations, maps of k and FLIP maps that a process keeps in memory."""
 AT_ONCE = 2
 """Pictures that are made at once."""
 WAITING = 16
 """Pictures that are made or wait to be; more are refused."""
+_MOST_APART = 20
+"""Measurements of which it is said why they are not offered."""
 
 Mode = Literal["slider", "blink", "difference", "flip", "k-a", "k-b"]
 MODES: dict[Mode, str] = {
@@ -63,7 +66,7 @@ class Where(BaseModel):
     model_config = ConfigDict(frozen=True)
 
     scene: Annotated[str, Field(pattern=r"^(?:scn_[0-9a-f]{32})?$")] = ""
-    view: Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")] = ""
+    view: Annotated[str, Field(max_length=LIMITS.view_name, pattern=PRINTED)] = ""
     a: _SideKey = ""
     b: _SideKey = ""
 
@@ -189,6 +192,7 @@ def show_comparison(request: Request, service: Services, look: Annotated[Look, Q
         pixel=pixel,
         looked=_look(request, found, *pixel) if pixel else None,
         most_rows=MOST_ROWS,
+        most_apart=_MOST_APART,
         **shared,
     )
     page.background = BackgroundTask(_comparer(request).inspector.prepare, (found.a, found.b))

@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from schemas.measurement import Measurement
 from services import summary
-from services.dashboard.scene_views import setting_of
+from services.dashboard.scene_views import camera_of, setting_of
 from services.database import Database
 from services.database.tables import measurements as table
 from services.report import charts
@@ -97,7 +97,8 @@ def history(database: Database, name: str, versions: Sequence[str]) -> list[Scen
             table.c.budget_factor,
             data["budget"].as_integer().label("budget"),
             data["alpha"].as_float().label("alpha"),
-            data["total_fragments"].as_integer().label("fragments"),  # two cameras may have the same name
+            data["total_fragments"].as_integer().label("fragments"),
+            data["camera"].as_json().label("camera"),  # two may have the same name
             data["mse"].as_float().label("mse"),
         )
         .where(table.c.model.in_(shown), table.c.technique == summary.BUNDLE, data["exact"].as_boolean().is_(False))
@@ -109,7 +110,8 @@ def history(database: Database, name: str, versions: Sequence[str]) -> list[Scen
         for row in connection.execute(query):
             if row.mse is not None:
                 errors = found[row.scene, row.scene_digest][row.model]
-                picture = row.view, row.fragments, row.budget_factor, row.budget, row.alpha
+                camera = camera_of(row.camera)
+                picture = row.view, camera, row.fragments, row.budget_factor, row.budget, row.alpha
                 errors.setdefault(picture, max(row.mse, summary.MSE_FLOOR))
     titles = _titles(found)
     return [SceneHistory(titles[scene], _compared(found[scene], shown)) for scene in sorted(found)]

@@ -53,6 +53,7 @@ _AGAIN = frozenset({429, 500, 503})
 _REMEDIES: Final[Mapping[str, str]] = {
     "not-found": "Check the address, or look for what you want in the lists below.",
     "method-not-allowed": "The address belongs to a button or a form: go back to its page, and use that.",
+    "invalid": "Correct what is named in the address or the form, then try again.",
     "forbidden": "Sign out, and sign in with a key that has the scope; `diaphane keys create` makes one.",
 }
 

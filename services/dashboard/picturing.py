@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from renderer.reference.flip import flip
-from services.dashboard.kept import Kept
 from services.dashboard.pixels import counts_of
 from services.dashboard.sides import Side
+from services.kept import Kept
 from services.report import colours
 from services.stages.pictures import read_png
 from services.store import Store

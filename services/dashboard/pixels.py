@@ -17,15 +17,16 @@ from labeller.reference import Pixel, pixel_of
 from schemas.colour import display8
 from schemas.problem import ExitCode, Problem
 from schemas.tail import MetricName, TailName
-from services.dashboard.kept import Kept
 from services.dashboard.sides import Side
+from services.kept import Kept
 from services.report import charts
 from services.stages.pictures import read_png
 from services.stages.tasks import METRIC, evaluated_from
 from services.store import Address, MissingArtifact, Store
 
 if TYPE_CHECKING:
-    from renderer.dump import DumpReader
+    from renderer.dump_pixels import DumpReader
+    from services.dashboard.members import Members
 
 MOST_ROWS = 256
 """Fragments that are listed."""
@@ -154,7 +155,7 @@ class Inspector:
 
     Args:
         store: Where artifacts lie.
-        kept: Where offsets and maps of k are kept between two looks.
+        kept: Where parts of dumps and allocations, and maps of k, are kept between two looks.
     """
 
     def __init__(self, store: Store, kept: Kept) -> None:
@@ -236,10 +237,23 @@ class Inspector:
         )
 
     def _reader(self, artifact: str) -> DumpReader:
-        from renderer.dump import DumpReader  # imported late: nothing else of the API needs zarr
+        from renderer.dump import GROUP  # imported late: nothing else of the API needs zarr
+        from renderer.dump_pixels import DumpReader
 
-        folder = self._store.fetch(artifact)  # each time: it may have been removed
-        return self._kept.get(artifact, lambda: DumpReader(folder), lambda made: made.bytes)
+        group = self._group(artifact, GROUP)
+        return self._kept.get(artifact, lambda: DumpReader(group), lambda made: made.bytes)
+
+    def _group(self, artifact: str, name: str) -> Members:
+        """A zarr group of an artifact.
+
+        Raises:
+            MissingArtifact: It is gone, though some of its files may be kept.
+        """
+        from services.dashboard.members import Members  # imported late, as above
+
+        if not self._store.holds(artifact):
+            raise MissingArtifact(artifact)
+        return Members(self._store, self._kept, artifact, name)
 
     def _k(self, side: Side, n: int, p: int) -> int | None:
         """What a side keeps apart in the pixel; None if its map is not kept."""
@@ -255,11 +269,11 @@ class Inspector:
 
     def _rules(self, side: Side, p: int) -> dict[str, int]:
         """Title of each rule -> its k at a side's budget; empty if the labels are not kept."""
-        from services.stages.allocations import pixel_allocations  # imported late, as above
+        from services.stages.allocations import GROUP, pixel_allocations  # imported late, as above
 
         try:
             _, labels = evaluated_from(self._made_from(side).inputs)
-            k = pixel_allocations(self._store.fetch(labels), side.shot.measured.budget, p)
+            k = pixel_allocations(self._group(labels, GROUP), side.shot.measured.budget, p)
         except (MissingArtifact, Problem) as reason:
             _require_absence(reason)
             return {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import sqlalchemy as sa
 
@@ -15,10 +15,11 @@ from services.database import Database
 from services.database.tables import measurements as table
 from services.stages.pictures import stem
 from services.stages.tasks import evaluated_from
-from services.store import MissingArtifact, Store
+from services.store import MissingArtifact, Store, canonical_json
 from services.tasks import FACTS
 
 _MOST_ROWS = 5_000
+_OWN = "the materials' own opacity"
 _MOST_LEVEL = 255
 """Pictures of counts have 8 bits."""
 
@@ -88,16 +89,62 @@ class SeenView:
         return min(_MOST_LEVEL, max([shot.measured.k_max or 1 for shot in shots], default=1))
 
 
-def setting_of(data: Mapping[str, Any]) -> tuple[Any, ...]:
-    """What the latest measurement of a view's name shares with all that can be compared with it.
+class Setting(NamedTuple):
+    """What two measurements of a view's name share if they can be compared.
 
-    Two cameras may have the same name: sampled views and those of `--views` are numbered. The fragments that they see
-    tell them apart.
+    Two cameras may have the same name: sampled views and those of `--views` are numbered.
+
+    Attributes:
+        camera: JSON of the view without its name; None: it was measured before cameras were recorded.
+        width: Pixels per row.
+        height: Rows.
+        alpha: Opacity of every surface; None: the materials' own.
+        tail: How the fragments beyond k are averaged.
+        fragments: N: it differs where another version of the code reads the scene otherwise.
+    """
+
+    camera: str | None
+    width: int
+    height: int
+    alpha: float | None
+    tail: str
+    fragments: int
+
+    def apart(self, other: Setting) -> str:
+        """Why what was measured so cannot be compared with what was measured otherwise; empty if it can."""
+        if None in (self.camera, other.camera) and self.camera != other.camera:
+            return "its camera, or that of what was measured last, was not recorded: evaluate both again"
+        found = []
+        if self.camera != other.camera:
+            one, two = (json.loads(camera or "{}") for camera in (self.camera, other.camera))
+            fields = ", ".join(name for name in sorted(one | two) if one.get(name) != two.get(name))
+            found.append(f"from another camera of the same name ({fields})")
+        if (self.width, self.height) != (other.width, other.height):
+            found.append(f"at {self.width} x {self.height} pixels")
+        if self.alpha != other.alpha:
+            found.append(f"with {_OWN if self.alpha is None else f'opacity {self.alpha:g}'}")
+        if self.tail != other.tail:
+            found.append(f"with the tail {self.tail}")
+        if self.fragments != other.fragments and not found:
+            found.append(
+                f"of {self.fragments:,} fragments, not {other.fragments:,}, as another version reads the scene"
+            )
+        return f"it was measured {' and '.join(found)}" if found else ""
+
+
+def setting_of(data: Mapping[str, Any]) -> Setting:
+    """What was measured, apart from technique and budget.
 
     Args:
         data: `schemas.measurement.Measurement` as JSON.
     """
-    return data["width"], data["height"], data["alpha"], data["tail"], data["total_fragments"]
+    fields = (data[name] for name in ("width", "height", "alpha", "tail", "total_fragments"))
+    return Setting(camera_of(data.get("camera")), *fields)
+
+
+def camera_of(view: Mapping[str, Any] | None) -> str | None:
+    """One text for each camera: JSON of a view without its name; None if it was not recorded."""
+    return None if view is None else canonical_json({name: value for name, value in view.items() if name != "name"})
 
 
 def views(database: Database, digest: str) -> list[SeenView]:
@@ -111,7 +158,7 @@ def views(database: Database, digest: str) -> list[SeenView]:
     with database.read() as connection:
         rows = connection.execute(query.order_by(table.c.id.desc()).limit(_MOST_ROWS)).all()
     found: dict[str, dict[tuple[str, float], Shot]] = {}
-    setting: dict[str, tuple[Any, ...]] = {}
+    setting: dict[str, Setting] = {}
     for row in rows:
         shot = Shot(row.artifact, row.model, Measurement.model_validate(row.data))
         m = shot.measured

@@ -10,6 +10,7 @@ import sqlalchemy as sa
 from fastapi import APIRouter, Path, Query, Request, Response
 from PIL import Image
 
+from schemas.limits import LIMITS
 from schemas.service import SceneState
 from services.api.etags import is_current
 from services.api.pages import MOMENT, Page
@@ -49,7 +50,7 @@ def show_scene(
     request: Request,
     scene_id: SceneIdPath,
     service: Services,
-    view: Annotated[str, Query(max_length=200)] = "",
+    view: Annotated[str, Query(max_length=LIMITS.view_name)] = "",
     budget: Annotated[str, Query(max_length=30)] = "",
 ) -> Response:
     """A scene; the query chooses the view and the budget of the pictures."""

@@ -21,7 +21,6 @@ from services.stages.pictures import EXACT
 _MOST_ROWS = 2_000
 _MOST_SCENES = 50
 _EXACT = "exact"
-_OTHERWISE = "it was measured from another camera, or at another size, opacity or tail, than what was measured last"
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,14 +76,16 @@ class Place:
         width: Pixels per row.
         height: Rows.
         sides: What has pictures, in the order in which they are offered.
-        absent: Key -> why there is no picture of it that could be compared.
+        apart: Key -> why it cannot be compared with these, though it was measured on a view of this name.
+        skipped: Key -> why it was not rendered.
     """
 
     view: str
     width: int
     height: int
     sides: tuple[Side, ...]
-    absent: dict[str, str]
+    apart: dict[str, str]
+    skipped: dict[str, str]
 
     def side(self, key: str) -> Side:
         """The side of a key.
@@ -95,9 +96,10 @@ class Place:
         found = next((side for side in self.sides if side.key == key), None)
         if found is not None:
             return found
+        why = self.skipped.get(key) or self.apart.get(key) or "it was not measured"
         raise Refusal(
             "not-found",
-            f"There is no picture of '{key}' on the view '{self.view}': {self.absent.get(key, 'it was not measured')}.",
+            f"There is no picture of '{key}' on the view '{self.view}': {why}.",
             "Choose another technique or budget on the page Compare, or evaluate the model on this scene.",
         )
 
@@ -151,12 +153,12 @@ def place(database: Database, digest: str, view: str) -> Place:
         )
     setting = setting_of(rows[0].data)
     found: dict[str, Any] = {}
-    absent: dict[str, str] = {}
+    apart: dict[str, str] = {}
     for row in rows:
-        if setting_of(row.data) == setting:
-            found.setdefault(_key(row.data, row.model), row)
+        if why := setting_of(row.data).apart(setting):
+            apart.setdefault(_key(row.data, row.model), why)
         else:
-            absent[_key(row.data, row.model)] = _OTHERWISE
+            found.setdefault(_key(row.data, row.model), row)
     shots = {key: Shot(row.artifact, row.model, Measurement.model_validate(row.data)) for key, row in found.items()}
     with_pictures = [shot for shot in shots.values() if shot.has_pictures]
     if with_pictures and (_EXACT not in shots or not shots[_EXACT].has_pictures):
@@ -170,7 +172,8 @@ def place(database: Database, digest: str, view: str) -> Place:
         width=first.width,
         height=first.height,
         sides=tuple(sorted(sides, key=lambda side: _order(side, names))),
-        absent=absent | {key: f"it was not rendered, {why}" for key, why in skipped if why is not None},
+        apart={key: why for key, why in apart.items() if key not in shots},
+        skipped={key: f"it was not rendered, {why}" for key, why in skipped if why is not None},
     )
 
 

@@ -15,6 +15,7 @@ import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
 from schemas.job import JobKind, JobSpec, JobState, TaskState
+from schemas.pixel_weights import DEFAULT_WEIGHTS
 from schemas.problem import ExitCode, Problem
 from schemas.service import EventRecord, ExecutorRecord, JobRecord, QueueRecord, TaskRecord
 from services.acceptance import Accepted
@@ -360,7 +361,7 @@ class Jobs:
 _SELECT = sa.select(tables.jobs)
 
 
-_LATER_FIELDS = {"replay": True, "patience": 0}
+_LATER_FIELDS = {"replay": True, "patience": 0, "weights": DEFAULT_WEIGHTS}
 """Fields that specs did not have from the beginning, with their defaults: a request from before is still the same."""
 
 

@@ -22,7 +22,7 @@ from services.engine.claims import Claims
 from services.engine.events import Event
 from services.engine.states import Abandoned, Claim
 from services.engine.tasks import Place, Tasks
-from services.problems import document_of
+from services.problems import document_of, without_paths
 from services.settings import Settings
 from services.sources import materialise
 from services.store import MissingArtifact
@@ -213,4 +213,4 @@ class Worker:
 
 def _summary(error: Exception) -> str:
     lines = str(error).splitlines() or [""]
-    return f"{type(error).__name__}: {lines[0][:200]}"
+    return f"{type(error).__name__}: {without_paths(lines[0])[:200]}"

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import zarr
 from numpy.typing import NDArray
+from zarr.abc.store import Store
 from zarr.codecs import BloscCodec
 
 from schemas.problem import ExitCode, Problem
@@ -19,7 +20,8 @@ from schemas.problem import ExitCode, Problem
 if TYPE_CHECKING:
     from labeller.allocation import Allocation, RuleName
 
-_NAME = "allocations.zarr"
+GROUP = "allocations.zarr"
+"""Folder of the group."""
 _CHUNK = 1 << 17
 """Pixels of a chunk, with all rules of a budget: 2 MiB, of which neighbouring pixels share most."""
 _MOST = 65_535
@@ -34,7 +36,7 @@ def write_allocations(folder: Path, made: Mapping[RuleName, Sequence[Allocation]
         made: For every rule its allocations, at the same budgets in the same order, each once; there may be none.
     """
     rules, budgets = list(made), [found.budget for found in next(iter(made.values()))]
-    group = zarr.open_group(folder / _NAME, mode="w")
+    group = zarr.open_group(folder / GROUP, mode="w")
     group.attrs.update({"rules": list(rules), "budgets": budgets})
     if not budgets:
         return
@@ -62,26 +64,27 @@ def read_allocation(folder: Path, rule: RuleName, fragments: int) -> NDArray[np.
     return np.asarray(stored[rules.index(rule), number], dtype=np.int32)
 
 
-def pixel_allocations(folder: Path, fragments: int, p: int) -> dict[str, int]:
+def pixel_allocations(source: Path | Store, fragments: int, p: int) -> dict[str, int]:
     """Rule -> k of one pixel; only the chunk that holds it is read.
 
     Args:
-        folder: Where `write_allocations` wrote.
+        source: Folder that `write_allocations` wrote to, or a store whose root is the group.
         fragments: F, one of the budgets.
         p: Index of the pixel.
 
     Raises:
         Problem: There are no allocations of that budget.
     """
-    stored, rules, number = _budget(folder, fragments)
+    stored, rules, number = _budget(source, fragments)
     k: list[int] = np.asarray(stored[:, number, p]).tolist()
     return dict(zip(rules, k, strict=True))
 
 
-def _budget(folder: Path, fragments: int) -> tuple[zarr.Array[Any], list[str], int]:
+def _budget(source: Path | Store, fragments: int) -> tuple[zarr.Array[Any], list[str], int]:
     """The array, the names along its first axis, and the place of a budget along its second."""
+    place = source / GROUP if isinstance(source, Path) else source
     try:
-        group = zarr.open_group(folder / _NAME, mode="r")
+        group = zarr.open_group(place, mode="r", zarr_format=3)
         rules, budgets = group.attrs["rules"], group.attrs["budgets"]
         stored = group["k"]
         if not (isinstance(stored, zarr.Array) and isinstance(rules, list) and isinstance(budgets, list)):
@@ -89,7 +92,7 @@ def _budget(folder: Path, fragments: int) -> tuple[zarr.Array[Any], list[str], i
         return stored, [str(rule) for rule in rules], budgets.index(fragments)
     except (KeyError, FileNotFoundError, ValueError) as reason:
         raise Problem(
-            f"{folder / _NAME} has no allocations of {fragments} fragments.",
-            "Delete that folder: the allocations are made again.",
+            f"{place} has no allocations of {fragments} fragments.",
+            "Remove it: the allocations are made again.",
             ExitCode.CONFLICT,
         ) from reason

@@ -28,12 +28,18 @@ from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from services.kept import Kept
 from services.storage.blobs import CHUNK, Blobs, MissingBlob
 from services.storage.remote import RANGE_BYTES, Remote
 from services.store import META, Address, MissingArtifact, Store, StoredArtifact, parse_meta, read_meta
 
 ORPHAN_SECONDS = 24 * 3600.0
 """A pack that has had no meta.json for this long was left by a crash."""
+
+METAS_BYTES = 8 << 20
+"""Of the meta.json of artifacts of which single files were read, in memory."""
+_FILE_BYTES = 400
+"""About what a file takes of them."""
 
 _ARTIFACT_KEY = re.compile(r"artifacts/([a-z][a-z0-9-]*)/[0-9a-f]{2}/([0-9a-f]{64})/(.+)")
 
@@ -51,6 +57,7 @@ class TieredStore(Store):
     def __init__(self, root: Path, remote: Remote) -> None:
         super().__init__(root)
         self._remote = remote
+        self._metas = Kept(METAS_BYTES)
 
     def fetch(self, artifact: str) -> Path:
         """The local folder of an artifact, downloaded if need be, its files verified.
@@ -77,6 +84,7 @@ class TieredStore(Store):
         if entry is not None:
             self._remote.touch(_used_name(artifact), entry.modified)
             return True
+        self._metas.drop(artifact)
         if not super().holds(artifact):
             return False
         try:
@@ -95,14 +103,17 @@ class TieredStore(Store):
         """
         with suppress(MissingArtifact):
             return super().read(artifact, name)
+        kept = self._metas.find(artifact)
+        if kept is not None:
+            with suppress(*_MALFORMED):  # removed by another process, which may have put another pack in its place
+                return self._file(artifact, kept, name)
+            self._metas.drop(artifact)
         meta, modified = self._remote_meta(artifact)
-        file = meta["files"].get(name)
-        if file is None:
-            raise FileNotFoundError(f"The artifact {artifact} has no file {name}.")
+        self._metas.keep(artifact, meta, _FILE_BYTES * len(meta["files"]))
         try:
-            content = b"".join(self._file_chunks(artifact, meta, file))
-            _check_sha256(name, file, hashlib.sha256(content).hexdigest())
+            content = self._file(artifact, meta, name)
         except _MALFORMED as error:
+            self._metas.drop(artifact)
             raise self._damaged(artifact, meta, error) from error
         self._remote.touch(_used_name(artifact), modified)
         return content
@@ -131,6 +142,7 @@ class TieredStore(Store):
 
     def remove(self, artifact: str) -> None:
         """Removes an artifact from the object store and the cache; does nothing if it is absent."""
+        self._metas.drop(artifact)
         self._remove_remote(artifact)
         super().remove(artifact)
 
@@ -225,6 +237,20 @@ class TieredStore(Store):
                     digest.update(chunk)
                     stream.write(chunk)
             _check_sha256(name, file, digest.hexdigest())
+
+    def _file(self, artifact: str, meta: dict[str, Any], name: str) -> bytes:
+        """A file of an artifact in the object store, verified.
+
+        Raises:
+            FileNotFoundError: The artifact has no file of that name.
+            ValueError: It is damaged, or is not there any more.
+        """
+        file = meta["files"].get(name)
+        if file is None:
+            raise FileNotFoundError(f"The artifact {artifact} has no file {name}.")
+        content = b"".join(self._file_chunks(artifact, meta, file))
+        _check_sha256(name, file, hashlib.sha256(content).hexdigest())
+        return content
 
     def _file_chunks(self, artifact: str, meta: dict[str, Any], file: dict[str, Any]) -> Iterator[bytes]:
         key = self._key(artifact, meta["pack"])

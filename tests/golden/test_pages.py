@@ -1,10 +1,13 @@
 """Pages of the dashboard as they look: light and dark, wide and narrow, over a service in which nothing is of chance.
 
-With the browser and the fonts that the golden pictures were made with, hardly a pixel may differ. Others draw controls
-and the edges of letters their own way (hinted letters: 1.5 % of the pixels of a page), but lay the page out alike:
-there a changed colour or a missing row is not seen, only what breaks the page.
+Each page is compared from its top to its end, in two ways:
+- its layout: every text, picture, chart and control in order, with its place. Any browser has to show the same at
+  nearly the same places; a chart or a row that is missing is found by name;
+- its pixels. With the browser and the fonts that the golden pictures were made with, hardly one may differ. Others
+  draw controls and the edges of letters their own way (hinted letters: 1.5 % of the pixels of a page): there a changed
+  colour is not seen, only what breaks the page.
 
-`python -m pytest tests/golden/test_pages.py --golden` writes them anew; look at them before they are committed.
+`python -m pytest tests/golden/test_pages.py --golden` writes both anew; look at them before they are committed.
 """
 
 from __future__ import annotations
@@ -13,6 +16,8 @@ import hashlib
 import io
 import json
 from collections.abc import Iterator
+from dataclasses import dataclass
+from difflib import SequenceMatcher
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +26,9 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 from support.api import Api
-from support.browser import CHROMIUM, FONTS, Tab, browser, font_files
+from support.browser import FONTS, Tab, font_files
+from support.compare import Filled
+from support.compare import fill as fill_comparison
 from support.dashboard import Shown, fill
 from support.frozen import frozen
 
@@ -30,14 +37,21 @@ MADE_WITH = FOLDER / "browser.json"
 
 COLOURS = 64
 """Of a golden picture. The page is compared as its palette shows it, so that the same page is the same."""
-ROWS = 1900
-"""Of a page that is longer, the upper ones are compared."""
 NEAR, FAR = 8, 96
 """Differences of a channel, of 255, up to which a pixel counts as the same: with the same browser, and with others."""
 SAME, OTHER = 1e-5, 0.02
 """Share of pixels that may differ by more."""
 HEIGHT = 0.01
 """Share of the height that another browser may add or leave out."""
+AWAY = 8
+"""Pixels that a box may lie away from where it was, or be larger or smaller, beside `HEIGHT`."""
+TOLD = 12
+"""Differences of a layout that are told."""
+
+LAYOUT = (Path(__file__).parent / "layout.js").read_text(encoding="utf-8").rstrip("\n;")
+
+Box = list[Any]
+"""Element, text, left, top, width, height."""
 
 PAGES = ("overview", "jobs", "job", "models", "model", "scenes", "scene", "sign-in")
 
@@ -59,19 +73,29 @@ def url(api: Api, shown: Shown) -> Iterator[str]:
         yield address
 
 
+@dataclass(frozen=True)
+class Compared:
+    """A service of its own with two views to compare, and where it is served."""
+
+    api: Api
+    filled: Filled
+    url: str
+
+
 @pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    pytest.importorskip("playwright.sync_api")
-    if CHROMIUM is None:
-        pytest.skip("chromium is not installed")
+def compared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Compared]:
     if len(font_files()) < len(FONTS):
         pytest.skip("the DejaVu fonts are not installed")
-    with browser(tmp_path_factory.mktemp("browser")) as started:
-        yield started
+    with frozen(tmp_path_factory.mktemp("compared")) as service:
+        filled = fill_comparison(service, (48, 32))
+        with service.served() as address:
+            yield Compared(service, filled, address)
 
 
 @pytest.fixture(scope="module", params=[(w, s) for w in (1280, 360) for s in ("light", "dark")], ids=str)
 def tab(request: pytest.FixtureRequest, chromium: Any, url: str, api: Api) -> Iterator[Tab]:
+    if len(font_files()) < len(FONTS):
+        pytest.skip("the DejaVu fonts are not installed")
     opened = Tab(chromium, url, *request.param)
     opened.sign_in(api.secrets["admin"])
     yield opened
@@ -82,22 +106,74 @@ def tab(request: pytest.FixtureRequest, chromium: Any, url: str, api: Api) -> It
 def test_page_looks_like_the_golden_one(
     page: str, tab: Tab, shown: Shown, chromium: Any, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
-    places = {"overview": "/", "job": f"/jobs/{shown.running}", "model": "/models/glass"}
-    picture = _screenshot(tab, places.get(page, f"/scenes/{shown.scene}" if page == "scene" else f"/{page}"))
-    golden_file = FOLDER / f"{page}-{tab.page.viewport_size['width']}-{tab.scheme}.png"
+    _open(tab, _place(page, shown))
+    _check(page, tab, chromium, request, tmp_path)
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (360, "dark")])
+def test_a_comparison_looks_like_the_golden_one(
+    width: int,
+    scheme: str,
+    compared: Compared,
+    chromium: Any,
+    request: pytest.FixtureRequest,
+    tmp_path: Path,
+) -> None:
+    """A pixel with its fragments, curve and rules under maps of a picture."""
+    tab = Tab(chromium, compared.url, width, scheme)
+    tab.sign_in(compared.api.secrets["read"])
+    _open(tab, f"/compare?scene={compared.filled.scene}&view=front&mode=k-b&x=20&y=11")
+    _check("compare", tab, chromium, request, tmp_path)
+    tab.context.close()
+
+
+def _check(page: str, tab: Tab, chromium: Any, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    """Compares what a tab shows with what is kept of a page."""
+    layout: list[Box] = tab.page.evaluate(LAYOUT)
+    picture = _screenshot(tab)
+    width = tab.page.viewport_size["width"]
+    golden_file, layout_file = FOLDER / f"{page}-{width}-{tab.scheme}.png", FOLDER / f"{page}-{width}.json"
     if request.config.getoption("--golden"):
         _reduced(picture, _palette(picture)).save(golden_file, optimize=True)
+        layout_file.write_text(_lines(layout), encoding="utf-8")
         MADE_WITH.write_text(json.dumps(_made_with(chromium), indent=1) + "\n", encoding="utf-8")
+    found = moved(layout, json.loads(layout_file.read_text(encoding="utf-8")))
+    assert found == [], "\n".join(found[:TOLD])
     with Image.open(golden_file) as image:
         golden, seen = np.asarray(image.convert("RGB")), np.asarray(_reduced(picture, image).convert("RGB"))
     is_same = json.loads(MADE_WITH.read_text(encoding="utf-8")) == _made_with(chromium)
-    found = difference(seen, golden, NEAR if is_same else FAR)
-    if found:
+    apart = difference(seen, golden, NEAR if is_same else FAR)
+    if apart:
         Image.fromarray(picture).save(tmp_path / golden_file.name)
     higher = abs(len(picture) - len(golden)) / len(golden)
     assert higher <= (0.0 if is_same else HEIGHT), f"see {tmp_path}"
-    assert found <= (SAME if is_same else OTHER), f"see {tmp_path}"
+    assert apart <= (SAME if is_same else OTHER), f"see {tmp_path}"
     assert tab.faults == []
+
+
+def test_what_is_missing_or_moved_is_named(chromium: Any, url: str, api: Api, shown: Shown) -> None:
+    """Whatever the browser: a chart, a row, a control or a picture less, and what is shown elsewhere."""
+    tab = Tab(chromium, url, 1280, "light")
+    tab.sign_in(api.secrets["admin"])
+    for page, change, said in (
+        ("model", "svg.chart", "missing: svg"),
+        ("model", "table tbody tr", "missing: "),
+        ("model", "svg.chart .mark", "missing: svg"),
+        ("scene", ".pictures img", "missing: img"),
+        ("jobs", "select", "missing: select"),
+        ("job", ".node", "missing: h3"),
+    ):
+        _open(tab, _place(page, shown))
+        golden: list[Box] = tab.page.evaluate(LAYOUT)
+        assert moved(golden, golden) == []
+        tab.page.evaluate(f"() => document.querySelector('main').querySelector('{change}').remove()")
+        assert any(one.startswith(said) for one in moved(tab.page.evaluate(LAYOUT), golden)), (page, change)
+    _open(tab, "/jobs")
+    golden = tab.page.evaluate(LAYOUT)
+    tab.page.evaluate("() => { document.querySelector('h1').style.marginTop = '40px'; }")
+    assert any(one.startswith("moved") for one in moved(tab.page.evaluate(LAYOUT), golden))
+    assert tab.faults == []
+    tab.context.close()
 
 
 def test_a_difference_is_seen() -> None:
@@ -118,23 +194,54 @@ def difference(picture: NDArray[np.uint8], golden: NDArray[np.uint8], step: int)
     return float((apart > step).mean())
 
 
-def _screenshot(tab: Tab, place: str) -> NDArray[np.uint8]:
-    """A page from its top on, uint8 [H, W, 3] of sRGB, once all its pictures are there."""
+def moved(layout: list[Box], golden: list[Box]) -> list[str]:
+    """What a page lacks, has more, or has elsewhere than a golden one."""
+    found: list[str] = []
+    names, expected = ([(kind, text) for kind, text, *_ in boxes] for boxes in (layout, golden))
+    for change, i, j, m, n in SequenceMatcher(None, expected, names, autojunk=False).get_opcodes():
+        if change != "equal":
+            found += [f"missing: {kind} {text}" for kind, text in expected[i:j]]
+            found += [f"added: {kind} {text}" for kind, text in names[m:n]]
+            continue
+        for (kind, text, *before), (_, _, *now) in zip(golden[i:j], layout[m:n], strict=True):
+            if any(abs(a - b) > AWAY + HEIGHT * abs(a) for a, b in zip(before, now, strict=True)):
+                found.append(f"moved: {kind} {text} from {before} to {now}")
+    return found
+
+
+def _place(page: str, shown: Shown) -> str:
+    places = {"overview": "/", "job": f"/jobs/{shown.running}", "model": "/models/glass"}
+    return places.get(page, f"/scenes/{shown.scene}" if page == "scene" else f"/{page}")
+
+
+def _open(tab: Tab, place: str) -> None:
+    """Opens a page, and waits until all its pictures are there."""
     tab.page.goto(place, wait_until="load")
     tab.page.evaluate(
-        "Promise.all([document.fonts.ready, ...[...document.images].map((one) => {"
+        "Promise.all([document.fonts.ready, ...[...document.images].filter((one) => one.src).map((one) => {"
         " one.loading = 'eager'; return one.decode(); })])"
     )
+
+
+def _screenshot(tab: Tab) -> NDArray[np.uint8]:
+    """The whole page, uint8 [H, W, 3] of sRGB."""
     content = tab.page.screenshot(full_page=True, animations="disabled")
     with Image.open(io.BytesIO(content)) as image:
-        return np.asarray(image.convert("RGB"))[:ROWS]
+        return np.asarray(image.convert("RGB"))
+
+
+def _lines(layout: list[Box]) -> str:
+    """JSON with a line for each element."""
+    return "[\n" + ",\n".join(json.dumps(one, ensure_ascii=False) for one in layout) + "\n]\n"
 
 
 def _palette(picture: NDArray[np.uint8]) -> Image.Image:
     """Half of the colours are the most frequent ones of a picture, the others cover the rest."""
     image = Image.fromarray(picture)
-    colours, counts = np.unique(picture.reshape(-1, 3), axis=0, return_counts=True)
-    frequent = colours[np.argsort(-counts, kind="stable")[: COLOURS // 2]]
+    packed = picture.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], dtype=np.uint32)
+    colours, counts = np.unique(packed, return_counts=True)
+    found = colours[np.argsort(-counts, kind="stable")[: COLOURS // 2]]
+    frequent = np.stack([found >> 16, found >> 8 & 255, found & 255], axis=-1)
     rest = image.quantize(COLOURS // 2, method=Image.Quantize.MAXCOVERAGE).getpalette() or []
     made = Image.new("P", (1, 1))
     made.putpalette([*frequent.ravel().tolist(), *rest])

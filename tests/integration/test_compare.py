@@ -13,20 +13,23 @@ import numpy as np
 import pytest
 from PIL import Image
 from support.api import Api, measurement
-from support.compare import FACTORS, HOSTILE_VIEW, MODELS, RULES, TAIL, Filled, G, fill
+from support.compare import CAMERA, FACTORS, HOSTILE_VIEW, MODELS, RULES, TAIL, Filled, G, fill
 from support.dashboard import Visitor
 from support.postgres import Postgres
 
 from labeller import reference
 from labeller.hull import lower_hulls
 from renderer import metrics
-from renderer.dump import DumpReader, read_dump
+from renderer.dump import read_dump
+from renderer.dump_pixels import DumpReader
 from renderer.exr import read_exr
 from schemas.colour import display8
 from schemas.problem import ExitCode, Problem
 from services.dashboard.compare import Comparer
-from services.dashboard.kept import Kept
+from services.dashboard.measured import history, of_version
 from services.dashboard.pixels import RULE_TITLES
+from services.dashboard.scene_views import views
+from services.kept import Kept
 from services.report import colours
 from services.stages.pictures import counts_map, read_png, write_png
 
@@ -217,6 +220,7 @@ def test_an_unknown_side_view_or_scene_is_a_page_that_says_so(reader: Visitor, f
 def test_bad_queries_are_refused(reader: Visitor, filled: Filled, bad: dict[str, str]) -> None:
     answer = reader.get(f"/compare?{_query(filled, **bad)}")
     assert (answer.status_code, answer.headers["content-type"].partition(";")[0]) == (422, "text/html")
+    assert f"&#39;{next(iter(bad))}&#39; in the address has to " in answer.text
     assert "<script>" not in answer.text
     assert "etc/passwd" not in answer.text
 
@@ -262,16 +266,56 @@ def test_nothing_measured_says_what_to_do(tmp_path: Path) -> None:
     assert Visitor(empty, "read").get(f"/compare?scene={scene}").status_code == 404
 
 
-def test_another_camera_of_the_same_name_is_not_compared(tmp_path: Path) -> None:
+_MOVED = CAMERA.model_copy(update={"eye": (0.0, 1.0, 3.0), "fov": 30.0})
+
+
+@pytest.mark.parametrize(
+    ("otherwise", "said"),
+    [
+        ({"camera": _MOVED}, "measured from another camera of the same name (eye, fov)"),
+        ({"camera": None}, "its camera, or that of what was measured last, was not recorded"),
+        ({"alpha": 0.5}, "measured with the materials&#39; own opacity"),
+        ({"width": 12, "height": 2}, "measured at 6 x 4 pixels"),
+        ({"tail": "density"}, "measured with the tail density-16"),
+        ({"total_fragments": 7}, "fragments, not 7, as another version reads the scene"),
+    ],
+    ids=lambda one: one if isinstance(one, str) else ", ".join(one),
+)
+def test_what_was_measured_otherwise_is_not_compared_and_it_is_said_why(
+    otherwise: dict[str, object], said: str, tmp_path: Path
+) -> None:
+    """A view's name tells little: what was measured last counts, and all else of that name is left out."""
     api = Api(tmp_path, rate=1e6, burst=10**6)
     filled, reader = fill(api, (6, 4)), Visitor(api, "read")
-    other = {"width": 6, "height": 4, "tail": TAIL, "total_fragments": filled.views["front"].dump.total + 1}
+    total = filled.views["front"].dump.total
+    same = {"width": 6, "height": 4, "tail": TAIL, "total_fragments": total, "camera": CAMERA}
     digest = api.service.scenes.get(filled.scene).digest
-    api.service.measured.record(f"evaluate/{'0' * 64}", [measurement(**other)], {"bottles": digest}, None, None)
-    (offered,) = re.findall(r'<select id="a".*?</select>', reader.get(f"/compare?{_query(filled)}").text, flags=re.S)
+    last = measurement(**{**same, **otherwise})
+    api.service.measured.record(f"evaluate/{'0' * 64}", [last], {"bottles": digest}, None, None)
+    page = reader.get(f"/compare?{_query(filled)}").text
+    (offered,) = re.findall(r'<select id="a".*?</select>', page, flags=re.S)
     assert re.findall(r'option value="([^"]+)"', offered) == ["exact", "kbuffer:1"]
+    assert re.search(rf"<code>glass@1.0.0:1</code>: [^<]*{re.escape(said)}", page)
     answer = reader.get(f"/compare?{_query(filled, a='glass@1.0.0:1')}")
-    assert (answer.status_code, "measured from another camera" in answer.text) == (404, True)
+    assert (answer.status_code, said in answer.text) == (404, True)
+    (seen,) = [view for view in views(api.service.database, digest) if view.name == "front"]
+    assert [shot.measured for shot in seen.shots] == [last]
+    assert of_version(api.service.database, "glass@1.0.0") != []  # its own setting, with the techniques measured there
+    (history_of,) = history(api.service.database, "glass", ["1.0.0", "1.1.0"])
+    assert history_of.errors[1] is not None
+    assert history_of.errors[1].ratio is not None
+
+
+def test_versions_are_compared_on_the_same_camera_only(tmp_path: Path) -> None:
+    api = Api(tmp_path)
+    for number, camera in enumerate((CAMERA, _MOVED, _MOVED.model_copy(update={"name": "renamed"}))):
+        found = [measurement(technique="kbuffer-deep", camera=camera, mse=0.1 * (number + 1))]
+        api.service.measured.record(
+            f"evaluate/{number:064x}", found, {"bottles": "1" * 64}, f"glass@1.{number}.0", None
+        )
+    (one,) = history(api.service.database, "glass", ["1.0.0", "1.1.0", "1.2.0"])
+    ratios = [error.ratio for error in one.errors if error is not None]
+    assert ratios == [None, None, pytest.approx(1.5)]
 
 
 def test_what_was_removed_is_said(tmp_path: Path) -> None:
@@ -313,7 +357,7 @@ def test_a_store_that_is_away_is_no_removed_artifact(
     def fail(*_: object) -> None:
         raise Problem("The object store cannot be reached.", "Try again.", ExitCode.TRY_AGAIN)
 
-    monkeypatch.setattr(type(api.service.storage.store), "fetch", fail)
+    monkeypatch.setattr(type(api.service.storage.store), "holds", fail)
     answer = reader.get(f"/compare/pixel?{_query(filled, x=1, y=1)}")
     assert (answer.status_code, "cannot be reached" in answer.text) == (503, True)
 
@@ -324,6 +368,9 @@ def test_the_same_comes_from_postgresql(postgres: Postgres, tmp_path: Path) -> N
     for path in ("/compare", "/compare?model=glass@1.0.0", f"/compare/pixel?{_query(filled, x=1, y=1)}"):
         assert reader.get(path).status_code == 200, path
     assert _picture(reader, filled, a="exact").shape == (4, 6, 3)
+    (one,) = history(api.service.database, "glass", ["1.0.0", "1.1.0"])
+    assert one.errors[1] is not None
+    assert one.errors[1].ratio is not None
 
 
 def test_only_so_many_pictures_are_made_at_once(

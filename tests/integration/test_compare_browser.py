@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 import os
-import shutil
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from urllib.parse import parse_qs, quote, urlsplit
+from urllib.parse import quote
 
 import pytest
 from support.api import Api
+from support.browser import Tab
 from support.compare import HOSTILE_VIEW, Filled, fill
 
-playwright = pytest.importorskip("playwright.sync_api")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-
-SECONDS = 60_000
-"""Of patience with a busy machine, ms."""
-AUDIT = Path(__file__).with_name("dashboard_audit.js").read_text(encoding="utf-8").rstrip("\n;")
-"""A function that returns what is wrong with a page for those who cannot see it, or not well."""
 SIZE = (48, 32)
 LOADED = "[...document.querySelectorAll('#stage img.on')].every((image) => image.complete && image.naturalWidth > 0)"
 
@@ -36,58 +27,23 @@ def filled(api: Api) -> Filled:
     return fill(api, SIZE)
 
 
-@pytest.fixture(scope="module")
-def url(api: Api) -> Iterator[str]:
-    with api.served() as address:
-        yield address
+def _tab(chromium: Any, api: Api, url: str, width: int, scheme: str, **more: Any) -> Tab:
+    opened = Tab(chromium, url, width, scheme, **more)
+    opened.page.goto("/sign-in?next=%2Fcompare")
+    opened.page.get_by_label("API key").fill(api.secrets["read"])
+    opened.page.keyboard.press("Enter")
+    opened.page.wait_for_url("**/compare*")
+    return opened
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as tools:
-        flags = ["--no-sandbox", "--disable-gpu"]
-        started = tools.chromium.launch(executable_path=CHROMIUM, args=flags, timeout=SECONDS)
-        yield started
-        started.close()
-
-
-class Tab:
-    """A signed-in tab that remembers what went wrong in it."""
-
-    def __init__(self, browser: Any, url: str, secret: str, width: int, scheme: str, **more: Any) -> None:
-        size = {"width": width, "height": 900}
-        self.context = browser.new_context(viewport=size, color_scheme=scheme, base_url=url, **more)
-        self.page = self.context.new_page()
-        self.page.set_default_timeout(SECONDS)
-        self.faults: list[str] = []
-        self.page.on(
-            "console", lambda said: self.faults.append(said.text) if said.type in ("error", "warning") else None
-        )
-        self.page.on("pageerror", lambda error: self.faults.append(str(error)))
-        self.page.goto("/sign-in?next=%2Fcompare")
-        self.page.get_by_label("API key").fill(secret)
-        self.page.keyboard.press("Enter")
-        self.page.wait_for_url("**/compare*")
-
-    def address(self) -> dict[str, str]:
-        """What the address says."""
-        return {name: values[0] for name, values in parse_qs(urlsplit(self.page.url).query).items()}
-
-    def until(self, expression: str) -> None:
-        """Waits until an expression is true; the page's policy forbids Playwright's own way."""
-        end = time.monotonic() + SECONDS / 1000
-        while not self.page.evaluate(expression):
-            assert time.monotonic() < end, expression
-            self.page.wait_for_timeout(20)
-
-    def pixel(self, x: int, y: int) -> None:
-        """Waits until the inspector shows a pixel."""
-        self.page.locator(f'.pixel[data-x="{x}"][data-y="{y}"]').wait_for()
+def _shows(tab: Tab, x: int, y: int) -> None:
+    """Waits until the inspector shows a pixel."""
+    tab.page.locator(f'.pixel[data-x="{x}"][data-y="{y}"]').wait_for()
 
 
 @pytest.fixture(scope="module", params=[(1280, "light"), (360, "dark")], ids=["wide and light", "narrow and dark"])
-def tab(request: pytest.FixtureRequest, browser: Any, api: Api, url: str, filled: Filled) -> Iterator[Tab]:
-    opened = Tab(browser, url, api.secrets["read"], *request.param)
+def tab(request: pytest.FixtureRequest, chromium: Any, api: Api, url: str, filled: Filled) -> Iterator[Tab]:
+    opened = _tab(chromium, api, url, *request.param)
     yield opened
     opened.context.close()
 
@@ -109,11 +65,17 @@ def test_every_mode_is_clean(tab: Tab, filled: Filled, tmp_path: Path) -> None:
     for mode in ("slider", "blink", "difference", "flip", "k-a", "k-b"):
         _open(tab, filled, f"&mode={mode}&x=20&y=11")
         tab.until(LOADED)
-        assert tab.page.evaluate(AUDIT) == [], mode
-        assert tab.page.evaluate("document.scrollingElement.scrollWidth") <= width, mode
+        assert tab.audit() == [], mode
         tab.page.screenshot(path=folder / f"compare-{mode}-{width}.png", full_page=True)
     _open(tab, filled, "&zoom=16&x=40&y=20", HOSTILE_VIEW)
     assert tab.page.evaluate("document.scrollingElement.scrollWidth") <= width
+    assert tab.faults == []
+
+
+def test_the_keyboard_reaches_everything_in_order_and_is_seen(tab: Tab, filled: Filled) -> None:
+    for mode in ("slider", "blink", "flip"):
+        _open(tab, filled, f"&mode={mode}&x=20&y=11")
+        assert tab.walk() == [], mode
     assert tab.faults == []
 
 
@@ -121,23 +83,23 @@ def test_the_pixel_goes_by_keyboard_and_into_the_address(tab: Tab, filled: Fille
     stage = _open(tab, filled)
     stage.focus()
     tab.page.keyboard.press("ArrowRight")  # takes hold of the one in the middle
-    tab.pixel(24, 16)
+    _shows(tab, 24, 16)
     tab.page.keyboard.press("ArrowRight")
     tab.page.keyboard.press("Shift+ArrowUp")
-    tab.pixel(25, 6)
+    _shows(tab, 25, 6)
     assert (tab.address()["x"], tab.address()["y"]) == ("25", "6")
     assert "Pixel 25, 6" in tab.page.get_by_role("status").inner_text()
     tab.page.get_by_label("Pixel x").fill("3")
     tab.page.keyboard.press("Enter")
-    tab.pixel(3, 6)
+    _shows(tab, 3, 6)
     tab.page.reload()
-    tab.pixel(3, 6)
+    _shows(tab, 3, 6)
     assert tab.page.get_by_label("Pixel x").input_value() == "3"
     stage.focus()
     tab.page.keyboard.press("Escape")
     assert "x" not in tab.address()
     tab.page.go_back()
-    tab.pixel(3, 6)
+    _shows(tab, 3, 6)
     assert tab.page.get_by_label("Pixel x").input_value() == "3"
     assert tab.faults == []
 
@@ -186,12 +148,12 @@ def test_another_side_is_another_page_and_what_was_in_focus_stays_so(tab: Tab, f
     tab.page.get_by_label("A", exact=True).focus()
     tab.page.get_by_label("A", exact=True).select_option("exact")
     tab.page.wait_for_url("**a=exact*")
-    tab.pixel(5, 6)
+    _shows(tab, 5, 6)
     assert tab.page.evaluate("document.activeElement.id") == "a"
     assert tab.address()["mode"] == "difference"
     tab.page.get_by_label("View").select_option(HOSTILE_VIEW)
     tab.page.wait_for_url("**view=%3Cb*")
-    tab.pixel(5, 6)
+    _shows(tab, 5, 6)
     assert tab.address()["view"] == HOSTILE_VIEW
     assert "near" not in tab.address()
     tab.page.go_back()
@@ -205,10 +167,10 @@ def test_the_pointer_inspects_holds_and_pans(tab: Tab, filled: Filled) -> None:
     box = tab.page.locator(".sheet").bounding_box()
     place = (box["x"] + box["width"] * 10.5 / SIZE[0], box["y"] + box["height"] * 4.5 / SIZE[1])
     tab.page.mouse.move(*place)
-    tab.pixel(10, 4)
+    _shows(tab, 10, 4)
     assert "x" not in tab.address()
     tab.page.mouse.click(*place)
-    tab.pixel(10, 4)
+    _shows(tab, 10, 4)
     tab.page.wait_for_url("**x=10&y=4*")
     tab.page.get_by_label("Zoom").select_option("16")
     tab.page.evaluate("document.getElementById('stage').scrollTo(200, 0)")
@@ -223,9 +185,9 @@ def test_the_pointer_inspects_holds_and_pans(tab: Tab, filled: Filled) -> None:
     assert tab.faults == []
 
 
-def test_blinking_waits_where_less_motion_is_asked_for(browser: Any, api: Api, url: str, filled: Filled) -> None:
+def test_blinking_waits_where_less_motion_is_asked_for(chromium: Any, api: Api, url: str, filled: Filled) -> None:
     for motion, pressed in (("reduce", "false"), ("no-preference", "true")):
-        tab = Tab(browser, url, api.secrets["read"], 1280, "light", reduced_motion=motion)
+        tab = _tab(chromium, api, url, 1280, "light", reduced_motion=motion)
         _open(tab, filled, "&mode=blink")
         assert tab.page.locator("#play").get_attribute("aria-pressed") == pressed
         if motion == "reduce":
@@ -248,7 +210,7 @@ def test_a_service_that_is_away_is_said(tab: Tab, filled: Filled) -> None:
     assert "cannot be reached" in tab.page.get_by_role("alert").inner_text()
     tab.page.unroute("**/compare/pixel?*")
     tab.page.keyboard.press("ArrowDown")
-    tab.pixel(5, 8)
+    _shows(tab, 5, 8)
     assert not tab.page.get_by_role("alert").is_visible()
     tab.faults.clear()  # the browser says it, too
 
@@ -260,7 +222,7 @@ def test_a_picture_that_failed_is_asked_for_again(tab: Tab, filled: Filled) -> N
     alert.wait_for()
     tab.page.locator("#stage").focus()
     tab.page.keyboard.press("ArrowDown")
-    tab.pixel(5, 7)
+    _shows(tab, 5, 7)
     assert "A picture could not be loaded" in alert.inner_text(), "a pixel that was read says nothing about pictures"
     tab.page.unroute("**/compare/picture.png?*")
     tab.page.get_by_role("button", name="Show", exact=True).click()
@@ -276,20 +238,20 @@ def test_the_slider_is_within_the_picture_and_in_the_address(tab: Tab, filled: F
     assert left == pytest.approx(0.25 * SIZE[0], abs=1.5)
     stage.focus()
     tab.page.keyboard.press("Space")
-    assert tab.address()["split"] == "100"
+    tab.page.wait_for_url("**split=100*")
     tab.page.reload()
     assert tab.page.get_by_label("A to the left of").input_value() == "100"
     assert tab.faults == []
 
 
-def test_without_scripts_the_button_does_it(browser: Any, api: Api, url: str, filled: Filled) -> None:
-    tab = Tab(browser, url, api.secrets["read"], 1280, "light", java_script_enabled=False)
+def test_without_scripts_the_button_does_it(chromium: Any, api: Api, url: str, filled: Filled) -> None:
+    tab = _tab(chromium, api, url, 1280, "light", java_script_enabled=False)
     _open(tab, filled)
     assert tab.page.locator("#stage img").count() == 2
     tab.page.get_by_label("k of B", exact=True).check()
     tab.page.get_by_label("Pixel x").fill("7")
     tab.page.get_by_label("y", exact=True).fill("9")
     tab.page.get_by_role("button", name="Show", exact=True).click()
-    tab.pixel(7, 9)
+    _shows(tab, 7, 9)
     assert tab.page.locator("#picture-map").get_attribute("alt") == "k of B"
     tab.context.close()

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 import shutil
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qs
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 MILLISECONDS = 60_000
@@ -22,6 +24,18 @@ WEBGPU = (
     *("--enable-features=Vulkan", "--use-vulkan=swiftshader", "--use-angle=vulkan"),  # else no canvas can be shown
 )
 """Flags with which it has WebGPU, in software."""
+
+SCHEMES = ("light", "dark")
+
+
+def script(name: str) -> str:
+    """A function that pages are looked at with, of a file beside the integration tests."""
+    file = Path(__file__).parents[1] / "integration" / name
+    return file.read_text(encoding="utf-8").rstrip("\n;")
+
+
+_AUDITS = (script("dashboard_audit.js"), script("dashboard_reach.js"))
+_FOCUS = script("dashboard_focus.js")
 
 _FLAGS = ("--no-sandbox", "--disable-gpu", "--disable-lcd-text", "--force-color-profile=srgb")
 _FONTS_CONF = """<?xml version="1.0"?>
@@ -88,14 +102,16 @@ class Tab:
         url: Of the service.
         width: Of the window, CSS pixels.
         scheme: `light` or `dark`.
+        more: Of the browser's context: `java_script_enabled`, `reduced_motion`, ...
 
     Attributes:
         scheme: Of its colours.
         faults: Errors and warnings of the console, uncaught errors, and requests that went elsewhere.
     """
 
-    def __init__(self, browser: Any, url: str, width: int, scheme: str) -> None:
-        self.context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme, base_url=url)
+    def __init__(self, browser: Any, url: str, width: int, scheme: str, **more: Any) -> None:
+        size = {"width": width, "height": 900}
+        self.context = browser.new_context(viewport=size, color_scheme=scheme, base_url=url, **more)
         self.page = self.context.new_page()
         self.page.set_default_timeout(MILLISECONDS)
         self.scheme, self.faults = scheme, list[str]()
@@ -111,3 +127,44 @@ class Tab:
         self.page.get_by_label("API key").fill(secret)
         self.page.keyboard.press("Enter")
         self.page.wait_for_url(f"**{to}")
+
+    def address(self) -> dict[str, str]:
+        """What the address says: the page's own, which Playwright's lags behind."""
+        query: str = self.page.evaluate("location.search")
+        return {name: values[0] for name, values in parse_qs(query.removeprefix("?")).items()}
+
+    def until(self, expression: str) -> None:
+        """Waits until an expression is true; the pages' policy forbids Playwright's own way."""
+        end = time.monotonic() + MILLISECONDS / 1000
+        while not self.page.evaluate(expression):
+            assert time.monotonic() < end, expression
+            self.page.wait_for_timeout(20)
+
+    def audit(self) -> list[str]:
+        """What is wrong with the page for those who cannot see it, or not well, in light and in dark, or too wide."""
+        found: list[str] = []
+        self._settle()
+        for scheme in SCHEMES:
+            self.page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+            found += [f"{scheme}: {fault}" for audit in _AUDITS for fault in self.page.evaluate(audit)]
+        self.page.emulate_media(color_scheme=self.scheme, reduced_motion="no-preference")
+        wide = self.page.evaluate("document.scrollingElement.scrollWidth") - self.page.viewport_size["width"]
+        return found + ([f"{wide} pixels too wide"] if wide > 0 else [])
+
+    def walk(self) -> list[str]:
+        """What is wrong with the way of the Tab key over the page, from what has the focus, or its top, to its end."""
+        found: list[str] = []
+        self._settle()
+        begun = self.page.evaluate(_FOCUS)
+        for place in range(begun["place"] + 1, begun["stops"]):
+            self.page.keyboard.press("Tab")
+            at = self.page.evaluate(_FOCUS)
+            if at["place"] != place:
+                return [*found, f"stop {at['place']} instead of {place}: {at['what']}"]
+            if not (at["outlined"] and at["seen"] and at["contrast"] >= 3.0):
+                found.append(f"the focus is not to be seen: {at}")
+        return found
+
+    def _settle(self) -> None:
+        """Waits until the page was laid out, and its scripts have seen how."""
+        self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => setTimeout(done)))")

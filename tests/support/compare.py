@@ -17,6 +17,7 @@ from renderer.exr import write_exr
 from schemas.colour import display8
 from schemas.fragments import FragmentDump
 from schemas.measurement import Measurement
+from schemas.view import View as Camera
 from services.stages import label
 from services.stages.pictures import counts_map, quantise_map, stem, write_png
 from services.store import Address
@@ -25,6 +26,7 @@ from support.dumps import random_dump
 
 TAIL, G = "density-16", 0.75
 FACTORS = (1.0, 2.0)
+CAMERA = Camera(name="front", eye=(0.0, 0.0, 3.0), target=(0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
 HOSTILE_VIEW = "<b onclick=x>\"'&?#/../%00"
 RULES: dict[str, RuleName] = {"kbuffer": "fixed", "kbuffer-importance": "importance", "kbuffer-optimal": "optimal"}
 MODELS: dict[str, RuleName] = {"glass@1.0.0": "uniform", "glass@1.1.0": "increment"}
@@ -107,6 +109,7 @@ def _evaluate(folder: Path, view: View, name: str, model: str | None) -> list[Me
         shots = [("kbuffer-deep", MODELS[model], factor) for factor in FACTORS]
     made = []
     about = {"view": name, "width": dump.width, "height": dump.height, "tail": TAIL, "total_fragments": dump.total}
+    about["camera"] = CAMERA.model_copy(update={"name": name})
     for technique, rule, factor in shots:
         k = view.k(rule, factor)
         linear = composite(dump, k, TAIL, G).reshape(shape)

@@ -79,7 +79,7 @@ class Service:
     def run(self, *command: str, **variables: str) -> subprocess.CompletedProcess[str]:
         """Runs a command as in the container."""
         environment = {**self.environment, **variables}
-        return subprocess.run(command, env=environment, cwd=self._folder, capture_output=True, text=True, timeout=240.0)
+        return subprocess.run(command, env=environment, cwd=self._folder, capture_output=True, text=True, timeout=480.0)
 
     def wait_until_healthy(self, seconds: float) -> None:
         """Checks until it is well; not again if it was."""

@@ -147,6 +147,7 @@ class TableRunner:
     def _record(
         self, artifact: str, measured: Sequence[Measurement], digests: Any, model: str | None, job: Any
     ) -> None:
+        assert all(one.camera is not None and one.camera.name == one.view for one in measured)
         self.recorded.append((artifact, len(measured), model))
 
     def _dataset(self, settings: Any, shards: Sequence[ShardRef], job: Any) -> Any:

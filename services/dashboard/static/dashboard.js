@@ -93,3 +93,28 @@ for (const chart of document.querySelectorAll("svg.chart")) {
     mark.setAttribute("aria-label", mark.querySelector("title").textContent);
   }
 }
+
+// What scrolls is a stop of the keyboard, if there is none in it; what does not scroll is none.
+const STOPS = "a[href], button, input, select, textarea, summary, [tabindex]";
+const scrollers = new ResizeObserver((entries) => entries.forEach((entry) => reach(entry.target)));
+function reach(box) {
+  const scrolls = box.scrollWidth > box.clientWidth + 1 || box.scrollHeight > box.clientHeight + 1;
+  if (scrolls && !box.querySelector(STOPS)) {
+    const before = (heading) => heading.compareDocumentPosition(box) & Node.DOCUMENT_POSITION_FOLLOWING;
+    const heading = [...document.querySelectorAll("h1, h2, h3")].filter(before).at(-1);
+    box.tabIndex = 0;
+    box.setAttribute("role", "region");
+    box.setAttribute("aria-label", (box.querySelector("caption") ?? heading)?.textContent.trim() ?? "");
+  } else {
+    for (const name of ["tabindex", "role", "aria-label"]) box.removeAttribute(name);
+  }
+}
+function watchScrollers() {
+  for (const box of document.querySelectorAll(".scroll, .log, pre")) {
+    if (box.dataset.watched !== undefined || box.hasAttribute("tabindex")) continue;
+    box.dataset.watched = "";
+    scrollers.observe(box);
+  }
+}
+new MutationObserver(watchScrollers).observe(document.getElementById("main"), { childList: true, subtree: true });
+watchScrollers();

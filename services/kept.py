@@ -1,4 +1,4 @@
-"""What a process keeps in memory of artifacts, within a bound: the least recently used goes first."""
+"""What a process keeps in memory, within a bound: the least recently used goes first."""
 
 from __future__ import annotations
 
@@ -30,16 +30,29 @@ class Kept:
             make: Makes it.
             size: Bytes of it.
         """
-        with self._lock:
-            if key in self._values:
-                self._values.move_to_end(key)
-                found: T = self._values[key][0]
-                return found
+        found: T | None = self.find(key)
+        if found is not None:
+            return found
         made = make()
-        self._keep(key, made, size(made))
+        self.keep(key, made, size(made))
         return made
 
-    def _keep(self, key: Hashable, value: object, size: int) -> None:
+    def find(self, key: Hashable) -> Any:
+        """The value of a key; None if it is not kept."""
+        with self._lock:
+            if key not in self._values:
+                return None
+            self._values.move_to_end(key)
+            return self._values[key][0]
+
+    def keep(self, key: Hashable, value: object, size: int) -> None:
+        """Keeps a value, unless its key has one or it is larger than all may be together.
+
+        Args:
+            key: Names it.
+            value: Not None.
+            size: Bytes of it.
+        """
         with self._lock:
             if key in self._values or size > self._most:
                 return
@@ -48,3 +61,9 @@ class Kept:
             while self._bytes > self._most:
                 _, (_, freed) = self._values.popitem(last=False)
                 self._bytes -= freed
+
+    def drop(self, key: Hashable) -> None:
+        """Forgets the value of a key, if there is one."""
+        with self._lock:
+            _, freed = self._values.pop(key, (None, 0))
+            self._bytes -= freed
