@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labeller.curves import composite
-from renderer.metrics import flip
+from renderer.reference.flip import flip
 from schemas.colour import display8, linear_to_srgb
 from schemas.fragments import FragmentDump
 from schemas.tail import DEFAULT_TAIL, DENSITY_G, TailName
@@ -67,7 +67,8 @@ def _slopes(shown: NDArray[np.float32], exact: NDArray[np.float32], width: int) 
         exact: The same of the picture that is right.
         width: Pixels per row.
     """
-    _, error_map = flip(*(display8(picture).reshape(-1, width, 3) for picture in (shown, exact)))
+    test, reference = (display8(picture).reshape(-1, width, 3) for picture in (shown, exact))
+    error_map = flip(test, reference)
     squared = np.square(linear_to_srgb(shown) - linear_to_srgb(exact)).sum(axis=1)
     return np.asarray((error_map.ravel() + UNSEEN_FLIP) / (squared + UNSEEN_ERROR))
 

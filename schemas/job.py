@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_vali
 
 from schemas.limits import LIMITS
 from schemas.network import DEFAULT_NETWORK, NetworkSize
+from schemas.pixel_weights import DEFAULT_WEIGHTS, PixelWeights
 from schemas.tail import DEFAULT_TAIL, DENSITY_G, TailName
 from schemas.view import ListedView
 
@@ -86,6 +87,8 @@ class JobSpec(BaseModel):
             scenes that the job does not have itself.
         patience: Validations without a better score after which the training stops; 0: never. A fifth of the training
             scenes is kept out for that.
+        weights: What a pixel's errors count in the rows that are trained on (`schemas.pixel_weights`); those of a data
+            set were weighted when it was made.
         promote: Whether a better version becomes the champion, or stays a candidate; a key without the scope `publish`
             gets the latter.
         priority: Class of the job's tasks in the queues; within a class, jobs share fairly.
@@ -113,6 +116,7 @@ class JobSpec(BaseModel):
     start_from: ModelReference = SCRATCH
     replay: bool = True
     patience: int = Field(default=0, ge=0, le=LIMITS.steps)
+    weights: PixelWeights = DEFAULT_WEIGHTS
     promote: Literal["if-better", "never"] = "if-better"
     priority: Priority = "normal"
 
@@ -129,6 +133,11 @@ class JobSpec(BaseModel):
             raise ValueError("an evaluate needs a model")
         if self.begins_with is not None and self.kind not in ("build", "train"):
             raise ValueError(f"a {self.kind} trains nothing, so there is nothing to start from")
+        if self.weights != DEFAULT_WEIGHTS and self.kind in ("render", "evaluate"):
+            article = "an" if self.kind == "evaluate" else "a"
+            raise ValueError(f"{article} {self.kind} makes no rows to train on, so there is nothing to weight")
+        if self.weights != DEFAULT_WEIGHTS and self.dataset is not None:
+            raise ValueError("the rows of a data set were weighted when it was made: weights are for a job with scenes")
         if self.dataset is not None and (self.kind != "train" or self.scenes):
             raise ValueError("a data set is for a train without scenes")
         if self.dataset is None and not self.scenes:

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
+from schemas.bundle import TailSpec
 from schemas.limits import LIMITS
 from schemas.network import DEFAULT_NETWORK, SIZES, NetworkSize
 from schemas.pixel_weights import DEFAULT_WEIGHTS, PIXEL_WEIGHTS, PixelWeights
@@ -126,6 +127,41 @@ def check_budget(budget: float, option: str, size: tuple[int, int] | None = None
             f"A budget of {budget:g} is less than one fragment of a picture of {size[0]}x{size[1]} pixels.",
             f"Budgets are multiples of width x height, here {least:.3g} or more: {option}.",
         )
+
+
+def check_steepness(g: float | None, *, has_bundle: bool, is_tail_named: bool, option: str = "--tail") -> None:
+    """Refuse a steepness that would not be that of the tail which is rendered: a bundle has a tail of its own.
+
+    Args:
+        g: As asked for; None: not asked for.
+        has_bundle: Whether there is a bundle.
+        is_tail_named: Whether a tail was asked for, which then takes the place of the bundle's.
+        option: Where a tail is given.
+
+    Raises:
+        Problem: It is out of range, or says nothing about the bundle's tail.
+    """
+    if g is None:
+        return
+    _require(math.isfinite(g) and 0.0 <= g <= 10.0, f"--g {g}", "is not between 0 and 10")
+    if has_bundle and not is_tail_named:
+        raise Problem(
+            f"--g {g:g} is the steepness of a tail, and none is named: the bundle brings its own, with its own g.",
+            f"Leave out --g, or name the tail as well: {option} density --g {g:g}.",
+        )
+
+
+def chosen_tail(tail: TailName | None, g: float | None, trained: TailSpec | None) -> TailSpec:
+    """What is rendered: a tail that is asked for, else the one that a network was trained with, else the usual one.
+
+    Args:
+        tail: Asked for; None: not.
+        g: Its steepness, asked for; None: that of the network, if it was trained with this tail, else the usual one.
+        trained: Tail of the network; None: there is none.
+    """
+    name = tail or (DEFAULT_TAIL if trained is None else trained.name)
+    usual = trained.g if trained is not None and trained.name == name else DENSITY_G
+    return TailSpec(name=name, g=usual if g is None else g)
 
 
 def check_bundle(reference: str | None, option: str) -> None:

@@ -177,6 +177,7 @@ def plan_of_job(spec: JobSpec, scenes: Mapping[str, SceneRecord]) -> Plan:
         steps=spec.steps,
         network=spec.network,
         patience=spec.patience,
+        weights=spec.weights,
         from_champion=spec.start_from == "champion",
         promote=spec.promote == "if-better",
     )

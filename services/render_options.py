@@ -19,8 +19,8 @@ from renderer.timecodes import check_pattern, parse_frames
 from schemas.colour import srgb_to_linear
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
-from schemas.tail import DENSITY_G, TailName
-from services.options import check_budget, check_bundle
+from schemas.tail import TailName
+from services.options import check_budget, check_bundle, check_steepness
 
 RGB = tuple[float, float, float]
 
@@ -43,8 +43,8 @@ class RenderOptions:
         needs: What some techniques need; the bundle is found by `bundle`.
         budget: F as a multiple of width * height.
         tail: How fragments beyond the core are approximated; None: as the bundle says, or the default.
-        g: Steepness of the density tail.
-        bundle: Folder of a bundle, or a name in the registry, for `kbuffer-deep`.
+        g: Steepness of the density tail; None: as the bundle says, or the usual one.
+        bundle: Folder of a bundle, or a name in the registry, for the techniques that need one.
         camera: Name or path of a camera.
         views: A views file.
         image_width: Pixels per row; rows follow from the camera.
@@ -66,7 +66,7 @@ class RenderOptions:
     needs: Needs = field(default_factory=Needs)
     budget: float = 2.0
     tail: TailName | None = None
-    g: float = DENSITY_G
+    g: float | None = None
     bundle: str | None = None
     camera: str | None = None
     views: Path | None = None
@@ -86,8 +86,7 @@ class RenderOptions:
                 raise Problem(f"{side} pixels are no side of a picture.", f"Give 1 to {LIMITS.max_side} pixels.")
         check_budget(self.budget, "--budget 2", self.size)
         check_bundle(self.bundle, "--bundle")
-        if not (math.isfinite(self.g) and 0.0 <= self.g <= 10.0):
-            raise Problem(f"--g {self.g} is not between 0 and 10.", "Change that option.")
+        check_steepness(self.g, has_bundle=self.bundle is not None, is_tail_named=self.tail is not None)
         if self.output is not None:
             if self.output.suffix.lower() not in SUFFIXES:
                 raise Problem(f"{self.output} is no name of a picture.", "End it in .png or .exr.")
@@ -98,7 +97,7 @@ def parse_techniques(names: Sequence[str], has_bundle: bool) -> tuple[str, ...]:
     """Names of techniques, also with commas between.
 
     Args:
-        names: As given; `all` means every one that there is, `kbuffer-deep` only with a bundle. None: the exact one.
+        names: As given; `all` means every one, without a bundle all that need none. None: the exact one.
         has_bundle: Whether a bundle is given.
 
     Raises:
@@ -110,7 +109,7 @@ def parse_techniques(names: Sequence[str], has_bundle: bool) -> tuple[str, ...]:
     found: list[str] = []
     for name in listed or [DEFAULT_TECHNIQUE]:
         if name == EVERY:
-            found += [each for each in TECHNIQUES if each != "kbuffer-deep" or has_bundle]
+            found += [each for each, entry in TECHNIQUES.items() if has_bundle or not entry.needs_bundle]
         elif name in TECHNIQUES:
             found.append(name)
         else:

@@ -21,11 +21,11 @@ from renderer.scene import NothingToDraw
 from renderer.techniques import TECHNIQUES, Budget, KBufferDeep, Rendered, SBuffer, Technique, technique
 from renderer.techniques.skips import HIDDEN_FRAGMENTS
 from renderer.timecodes import numbered
+from schemas.bundle import TailSpec
 from schemas.colour import display8
 from schemas.problem import ExitCode, Problem
-from schemas.tail import DEFAULT_TAIL
 from services.local_scenes import Chosen, LocalScene, as_usd
-from services.options import check_budget
+from services.options import check_budget, chosen_tail
 from services.progress import Progress
 from services.render_options import RenderOptions
 from services.stages.pictures import write_png
@@ -106,12 +106,14 @@ class _Job:
         chosen: The view.
         frame: Time code, or None for the default time.
         size: Width and height.
+        tail: Of the bounded techniques.
     """
 
     scene: LocalScene
     chosen: Chosen
     frame: float | None
     size: tuple[int, int]
+    tail: TailSpec
 
 
 def render(options: RenderOptions, progress: Progress) -> Iterator[Picture]:
@@ -123,24 +125,22 @@ def render(options: RenderOptions, progress: Progress) -> Iterator[Picture]:
     with bundle_folder(options.bundle, options.state) as bundle:
         needs = replace(options.needs, bundle=bundle, allocate=optimal)
         techniques = [technique(name, needs) for name in options.techniques]
-        options = _with_tail(options, techniques)
+        trained = next((each.manifest.tail for each in techniques if isinstance(each, KBufferDeep)), None)
+        tail = chosen_tail(options.tail, options.g, trained)
         written: set[Path] = set()
         for file in options.scenes:
             with as_usd(file) as usd:
                 scene = LocalScene(file, usd, options.load)
-                yield from _scene(scene, techniques, options, progress, written)
-
-
-def _with_tail(options: RenderOptions, techniques: list[Technique]) -> RenderOptions:
-    """The same with the tail that a network was trained with, where there is one and none is asked for."""
-    if options.tail is not None:
-        return options
-    trained = [each.manifest.tail for each in techniques if isinstance(each, KBufferDeep)]
-    return replace(options, tail=trained[0].name, g=trained[0].g) if trained else options
+                yield from _scene(scene, techniques, tail, options, progress, written)
 
 
 def _scene(
-    scene: LocalScene, techniques: list[Technique], options: RenderOptions, progress: Progress, written: set[Path]
+    scene: LocalScene,
+    techniques: list[Technique],
+    tail: TailSpec,
+    options: RenderOptions,
+    progress: Progress,
+    written: set[Path],
 ) -> Iterator[Picture]:
     warm: set[str] = set()
     told: set[str] = set()
@@ -160,7 +160,7 @@ def _scene(
                 told.add(warning)
         frame = scene.start if time is None else None if math.isnan(time) else time
         for chosen in scene.views(options.camera, options.views):
-            job = _Job(scene, chosen, frame, size_of(options, chosen.aspect))
+            job = _Job(scene, chosen, frame, size_of(options, chosen.aspect), tail)
             check_budget(options.budget, "--budget 2", job.size)
             for each in techniques:
                 path = path_of(options, job, each.name)
@@ -174,8 +174,7 @@ def _scene(
 
 def _picture(job: _Job, each: Technique, path: Path, options: RenderOptions, warm: set[str]) -> Picture:
     width, height = job.size
-    tail = options.tail or DEFAULT_TAIL
-    budget = Budget(int(options.budget * width * height), tail, options.g)
+    budget = Budget(int(options.budget * width * height), job.tail.name, job.tail.g)
     about = Picture(
         file=path,
         scene=job.scene.file,
@@ -187,7 +186,7 @@ def _picture(job: _Job, each: Technique, path: Path, options: RenderOptions, war
         width=width,
         height=height,
         budget=budget.fragments,
-        tail=tail,
+        tail=job.tail.name,
         warnings=job.scene.gpu().scene.warnings,
     )
     try:
@@ -253,7 +252,7 @@ def _write(found: Picture, rendered: Rendered, job: _Job, options: RenderOptions
         "totalBytes": str(found.total_bytes),
     }
     if found.family == "bounded":
-        attributes |= {"budget": str(found.budget), "tail": found.tail, "g": options.g}
+        attributes |= {"budget": str(found.budget), "tail": job.tail.name, "g": job.tail.g}
     scene = job.scene.gpu().scene
     attributes |= camera_attributes(job.chosen.view, scene, found.width, found.height)
     with replacing(found.file) as path:

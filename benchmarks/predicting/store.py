@@ -47,7 +47,7 @@ CODE: Final = {
     ),
     "tails": (*_LABELLER, "schemas.tail", *_here("tails", "tail_kernels")),
     "learned": ("renderer.depth_bins", *_here("learned_tail", "learned_scores", "tail_kernels")),
-    "weighted": ("labeller.flip_weights", "renderer.metrics", "schemas.colour", *_here("weighted")),
+    "weighted": ("labeller.flip_weights", "renderer.reference.flip", "schemas.colour", *_here("weighted")),
     "factors": ("schemas.tail", *_here("factors", "factor_scores", "tail_kernels")),
 }
 """Sources that decide a kind of result: one of them changed, it is worked out again."""

@@ -10,13 +10,13 @@ from renderer.techniques import TECHNIQUES
 from renderer.techniques.chain import SLOT_BYTES
 from schemas.bench import Basis, CellKey
 from schemas.bundle import MANIFEST, TailSpec, load_manifest
-from schemas.tail import TailName
+from schemas.tail import DEFAULT_TAIL, TailName
 from services.bench.options import BenchOptions
+from services.options import chosen_tail
 from services.store import file_sha256
 
 FIXED = "kbuffer"
 """Whose total bytes are what the others are given at equal memory."""
-LEARNED = "kbuffer-deep"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,9 +62,11 @@ def planned(options: BenchOptions, bundle: Bundle | None) -> list[CellKey]:
 
 
 def _tails(name: str, options: BenchOptions, bundle: Bundle | None) -> list[tuple[TailName, float | None, str | None]]:
-    if name == LEARNED and bundle is not None:
+    if TECHNIQUES[name].needs_bundle and bundle is not None:
         return [(bundle.tail.name, steepness(bundle.tail.name, bundle.tail.g), bundle.label)]
-    return [(tail, steepness(tail, options.g), None) for tail in options.tails]
+    trained = None if bundle is None else bundle.tail
+    chosen = [chosen_tail(tail, options.g, trained) for tail in options.tails or (DEFAULT_TAIL,)]
+    return [(tail.name, steepness(tail.name, tail.g), None) for tail in chosen]
 
 
 def steepness(tail: TailName, g: float) -> float | None:

@@ -38,7 +38,7 @@ class Bench:
     Args:
         subject: The view.
         options: What was asked for.
-        bundle: For `kbuffer-deep`.
+        bundle: For the techniques that need one.
     """
 
     subject: Subject

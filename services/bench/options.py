@@ -10,8 +10,8 @@ from pathlib import Path
 from renderer.techniques import TECHNIQUES, Needs, technique
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
-from schemas.tail import DEFAULT_TAIL, DENSITY_G, TailName
-from services.options import check_budget, check_bundle, parse_size, parse_tail
+from schemas.tail import TailName
+from services.options import check_budget, check_bundle, check_steepness, parse_size, parse_tail
 
 AUTHORED = "authored"
 """The word for the materials' own opacity."""
@@ -33,9 +33,9 @@ class BenchOptions:
         budgets: F as multiples of width * height.
         alphas: Opacities that every surface gets, one run each; None: the materials' own.
         sizes: Widths and heights, one run each.
-        tails: Of the bounded techniques; `kbuffer-deep` always has its bundle's.
-        g: Steepness of the density tail.
-        bundle: Folder of a bundle, or a name in the registry, for `kbuffer-deep`.
+        tails: Of the bounded techniques; those that need a bundle always have its tail. Empty: the usual one.
+        g: Steepness of the density tail of those that are named; None: see `services.options.chosen_tail`.
+        bundle: Folder of a bundle, or a name in the registry, for the techniques that need one.
         needs: What else some techniques need.
         camera: Name or path of a camera.
         views: A views file.
@@ -59,8 +59,8 @@ class BenchOptions:
     budgets: tuple[float, ...] = DEFAULT_BUDGETS
     alphas: tuple[float | None, ...] = (None,)
     sizes: tuple[tuple[int, int], ...] = (DEFAULT_SIZE,)
-    tails: tuple[TailName, ...] = (DEFAULT_TAIL,)
-    g: float = DENSITY_G
+    tails: tuple[TailName, ...] = ()
+    g: float | None = None
     bundle: str | None = None
     needs: Needs = field(default_factory=Needs)
     camera: str | None = None
@@ -97,8 +97,6 @@ class BenchOptions:
         smallest = min(self.sizes, key=lambda size: size[0] * size[1])
         for budget in self.budgets:
             check_budget(budget, "--budgets 1,2,4", smallest)
-        if not (math.isfinite(self.g) and 0.0 <= self.g <= 10.0):
-            raise Problem(f"--g {self.g} is not between 0 and 10.", "Change that option.")
         _in_range("--repeats", self.repeats, 1, MOST_REPEATS)
         _in_range("--most-views", self.most_views, 1, LIMITS.views)
         if self.path:
@@ -106,9 +104,10 @@ class BenchOptions:
         if not (math.isfinite(self.limit) and self.limit > 0.0):
             raise Problem(f"--limit {self.limit} is no time.", "Give seconds, above 0.")
         check_bundle(self.bundle, "--bundle")
-        if "kbuffer-deep" in self.techniques and self.bundle is None:
-            raise Problem("kbuffer-deep needs a bundle.", "Name one with --bundle, or leave the technique out.")
+        check_steepness(self.g, has_bundle=self.bundle is not None, is_tail_named=bool(self.tails), option="--tails")
         for name in self.techniques:
+            if TECHNIQUES[name].needs_bundle and self.bundle is None:
+                raise Problem(f"{name} needs a bundle.", "Name one with --bundle, or leave the technique out.")
             if TECHNIQUES[name].family == "approximate":
                 technique(name, self.needs)  # refuses nodes and samples that it cannot work with
 

@@ -19,11 +19,12 @@ from renderer.frame import RGB, Frame
 from renderer.gpu_scene import GpuScene
 from renderer.techniques import Budget, Rendered
 from schemas.bench import Yardstick
-from schemas.colour import display8, linear_to_srgb
+from schemas.colour import display8
 from schemas.fragments import FragmentDump
 from schemas.tail import TailName
 from schemas.view import View
 from services.bench.cells import steepness
+from services.bench.exact import Exact
 
 ORACLE_TAIL: TailName = "weighted-average"
 """Of DHOIT's Algorithm 1, with the opacity factor that the paper leaves out (METHOD.md section 2)."""
@@ -72,19 +73,19 @@ class Subject:
         return capture(self.frame()).dump
 
     @cached_property
-    def exact(self) -> NDArray[np.float32]:
-        """The exact picture, float32 [P, 3], linear RGB: all fragments composited on the CPU in float64."""
-        return composite(self.dump, self.dump.counts)
+    def reference(self) -> Exact:
+        """The exact picture."""
+        return Exact(self.dump)
 
-    @cached_property
+    @property
+    def exact(self) -> NDArray[np.float32]:
+        """The exact picture, float32 [P, 3], linear RGB."""
+        return self.reference.linear
+
+    @property
     def exact8(self) -> NDArray[np.uint8]:
         """The same as displayed, uint8 [H, W, 3]."""
-        return display8(self.exact).reshape(self.size[1], self.size[0], 3)
-
-    @cached_property
-    def exact_display(self) -> NDArray[np.float32]:
-        """The same as sRGB values before rounding, float32 [P, 3]."""
-        return linear_to_srgb(self.exact).astype(np.float32)
+        return self.reference.image
 
     def curves(self, tail: TailName, g: float) -> Curves:
         """Error curves of all pixels with a tail, as displayed."""
@@ -130,7 +131,7 @@ class Subject:
                     budget_factor=factor,
                     budget=found.budget,
                     mse=metrics.mse(display8(linear), self.exact8.reshape(-1, 3)),
-                    mse_display=self.display_error(linear),
+                    mse_display=self.reference.display_error(linear),
                     gap=found.gap,
                     k_min=int(k.min(initial=np.iinfo(np.int32).max)) if len(k) else 0,
                     k_max=int(k.max(initial=0)),
@@ -151,17 +152,13 @@ class Subject:
         error = metrics.mse(image, self.exact8)
         return Errors(
             mse=error,
-            mse_display=self.display_error(linear),
+            mse_display=self.reference.display_error(linear),
             mse_linear=float(np.mean(np.square(linear - self.exact, dtype=np.float64))),
             mse_occupied=_mse(image.reshape(-1, 3)[occupied], self.exact8.reshape(-1, 3)[occupied]),
             psnr=None if error == 0.0 else metrics.psnr(error),
             ssim=metrics.ssim(image, self.exact8),
             flip=metrics.flip(image, self.exact8)[0],
         )
-
-    def display_error(self, linear: NDArray[np.floating]) -> float:
-        """Mean squared difference of sRGB values before rounding, of a picture as linear RGB, [P, 3]."""
-        return float(np.mean(np.square(linear_to_srgb(linear) - self.exact_display, dtype=np.float64)))
 
 
 def _mse(test: NDArray[np.uint8], reference: NDArray[np.uint8]) -> float:

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAIL_HELP
+from schemas.tail import DEFAULT_TAIL, TAIL_HELP
 from services.cli import output
 from services.cli.scene_options import CameraOption, ComplexityOption, RefineOption, VariantOption
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
@@ -43,12 +43,17 @@ def bench(
         str, typer.Option("--size", help="WIDTHxHEIGHT in pixels; several with commas between.")
     ] = "1430x960",
     tails: Annotated[
-        str,
-        typer.Option("--tails", help=f"Of bounded techniques, with commas between. {TAIL_HELP}"),
-    ] = DEFAULT_TAIL,
-    g: SteepnessOption = DENSITY_G,
+        str | None,
+        typer.Option(
+            "--tails",
+            help=f"Of bounded techniques, with commas between; kbuffer-deep has its bundle's. {TAIL_HELP} "
+            f"Default: {DEFAULT_TAIL}.",
+        ),
+    ] = None,
+    g: SteepnessOption = None,
     bundle: Annotated[
-        str | None, typer.Option("--bundle", help="For kbuffer-deep: a folder, or NAME@ALIAS of the registry.")
+        str | None,
+        typer.Option("--bundle", help="For kbuffer-deep and -temporal: a folder, or NAME@ALIAS of the registry."),
     ] = None,
     inference: InferenceOption = "glsl",
     vkb: VkbOption = "",
@@ -96,7 +101,7 @@ def bench(
         budgets=parse_budgets(budgets),
         alphas=parse_alphas(alpha),
         sizes=parse_sizes(picture_size),
-        tails=parse_tails(tails),
+        tails=() if tails is None else parse_tails(tails),
         g=g,
         bundle=bundle,
         needs=parse_needs(vkb, inference, nodes, samples),
@@ -131,5 +136,5 @@ def bench(
     if note := check_same_code(result):
         progress.note(note)
     if "kbuffer-deep" not in options.techniques and techniques == "all":
-        progress.note("kbuffer-deep is left out: give a bundle with --bundle.")
+        progress.note("kbuffer-deep and kbuffer-temporal are left out: give a bundle with --bundle.")
     print(out / "index.html")

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from schemas.network import DEFAULT_NETWORK
-from schemas.pixel_weights import DEFAULT_WEIGHTS
+from schemas.pixel_weights import DEFAULT_WEIGHTS, WEIGHTS_HELP
 from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAIL_HELP
 from services.cli import output
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
-from services.cli.technique_options import SteepnessOption
 
 if TYPE_CHECKING:
     from services.options import BuildOptions
@@ -37,7 +36,7 @@ def build(
     ] = 3,
     size: Annotated[str, typer.Option("--size", help="Width and height of the pictures, pixels.")] = "1430x960",
     tail: Annotated[str, typer.Option("--tail", help=TAIL_HELP)] = DEFAULT_TAIL,
-    g: SteepnessOption = DENSITY_G,
+    g: Annotated[float, typer.Option("--g", help="Steepness of the density tail.")] = DENSITY_G,
     seed: Annotated[int, typer.Option("--seed", help="Seed of everything drawn at random.")] = 0,
     steps: Annotated[int | None, typer.Option("--steps", help="Optimiser steps. Default: the trainer's.")] = None,
     network: Annotated[
@@ -46,9 +45,7 @@ def build(
     patience: Annotated[
         int, typer.Option("--patience", help="Stop after so many validations without a better score; 0: never.")
     ] = 0,
-    weights: Annotated[
-        str, typer.Option("--weights", help="What a pixel's errors count in training: none (all alike) or flip.")
-    ] = DEFAULT_WEIGHTS,
+    weights: Annotated[str, typer.Option("--weights", help=WEIGHTS_HELP)] = DEFAULT_WEIGHTS,
     start: Annotated[
         str | None, typer.Option("--from", help="Bundle to begin with: a folder, or NAME@ALIAS of the registry.")
     ] = None,

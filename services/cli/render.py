@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from schemas.tail import DENSITY_G
 from services.cli import output
 from services.cli.lines import size
 from services.cli.scene_options import (
@@ -54,9 +53,10 @@ def render(
     ] = None,
     budget: BudgetOption = 2.0,
     tail: TailOption = None,
-    g: SteepnessOption = DENSITY_G,
+    g: SteepnessOption = None,
     bundle: Annotated[
-        str | None, typer.Option("--bundle", help="For kbuffer-deep: a folder, or NAME@ALIAS of the registry.")
+        str | None,
+        typer.Option("--bundle", help="For kbuffer-deep and -temporal: a folder, or NAME@ALIAS of the registry."),
     ] = None,
     inference: InferenceOption = "glsl",
     vkb: VkbOption = "",

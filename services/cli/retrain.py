@@ -30,6 +30,7 @@ from services.cli.submit import (
     TailOption,
     ViewsOption,
     ViewsPerSceneOption,
+    WeightsOption,
     job_fields,
     job_spec,
 )
@@ -58,6 +59,7 @@ def retrain(
     ] = CHAMPION,
     is_forgotten: NoReplayOption = False,
     patience: PatienceOption = None,
+    weights: WeightsOption = None,
     is_promoted: Annotated[bool, typer.Option("--promote", help="Make it the champion if it is better.")] = False,
     summary: Annotated[Path | None, typer.Option("--summary", help="File that the Markdown table goes to.")] = None,
     budgets: BudgetsOption = None,
@@ -91,6 +93,7 @@ def retrain(
         network=network,
         steps=steps,
         patience=patience,
+        weights=weights,
         priority=priority,
     )
     remote = connect(url, key_file)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from schemas.pixel_weights import WEIGHTS_HELP
 from schemas.problem import Problem
 from schemas.tail import TAIL_HELP
 from services.cli import output
@@ -38,6 +39,7 @@ NoReplayOption = Annotated[
 PatienceOption = Annotated[
     int | None, typer.Option("--patience", help="Stop after so many validations without a better score; 0: never.")
 ]
+WeightsOption = Annotated[str | None, typer.Option("--weights", help=WEIGHTS_HELP)]
 PriorityOption = Annotated[str | None, typer.Option("--priority", help="low, normal or high.")]
 
 
@@ -69,6 +71,7 @@ def submit(
     ] = None,
     is_forgotten: NoReplayOption = False,
     patience: PatienceOption = None,
+    weights: WeightsOption = None,
     promote: Annotated[str | None, typer.Option("--promote", help="if-better or never.")] = None,
     priority: PriorityOption = None,
     idempotency_key: Annotated[
@@ -95,6 +98,7 @@ def submit(
         network=network,
         steps=steps,
         patience=patience,
+        weights=weights,
         priority=priority,
     )
     named = {"name": name, "dataset": dataset, "model": model, "start_from": start, "promote": promote}
@@ -119,14 +123,20 @@ def submit(
 
 
 def job_fields(
-    *, budgets: str | None, size: str | None, tail: str | None, network: str | None, **plain_fields: Any
+    *,
+    budgets: str | None,
+    size: str | None,
+    tail: str | None,
+    network: str | None,
+    weights: str | None,
+    **plain_fields: Any,
 ) -> dict[str, Any]:
     """Fields of a job from options; what was not given is left to the server's defaults.
 
     Raises:
         Problem: An option cannot be read.
     """
-    from services.options import parse_budgets, parse_network, parse_size, parse_tail
+    from services.options import parse_budgets, parse_network, parse_size, parse_tail, parse_weights
 
     fields = {name: value for name, value in plain_fields.items() if value is not None}
     if budgets is not None:
@@ -137,6 +147,8 @@ def job_fields(
         fields["tail"] = parse_tail(tail)
     if network is not None:
         fields["network"] = parse_network(network)
+    if weights is not None:
+        fields["weights"] = parse_weights(weights)
     return fields
 
 

@@ -6,13 +6,18 @@ from typing import Annotated
 
 import typer
 
-from schemas.tail import DEFAULT_TAIL, TAIL_HELP
+from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAIL_HELP
 
 BudgetOption = Annotated[float, typer.Option("--budget", help="Fragments, as a multiple of width x height.")]
 TailOption = Annotated[
     str | None, typer.Option("--tail", help=f"{TAIL_HELP} Default: the bundle's, or {DEFAULT_TAIL}.")
 ]
-SteepnessOption = Annotated[float, typer.Option("--g", help="Steepness of the density tail.")]
+SteepnessOption = Annotated[
+    float | None,
+    typer.Option(
+        "--g", help=f"Steepness of the density tail, with a bundle only beside a tail. Default: {DENSITY_G:g}."
+    ),
+]
 InferenceOption = Annotated[str, typer.Option("--inference", help="How kbuffer-deep runs its network: glsl or onnx.")]
 VkbOption = Annotated[
     str, typer.Option("--vkb", help="For kbuffer-importance: thesis, no-depth, no-periphery, no-fresnel, no-noise.")

@@ -9,7 +9,6 @@ from typing import Annotated
 import typer
 
 from schemas.problem import Problem
-from schemas.tail import DENSITY_G
 from services.cli import output
 from services.cli.scene_options import (
     WHITE,
@@ -19,7 +18,6 @@ from services.cli.scene_options import (
     ComplexityOption,
     RefineOption,
     SceneArgument,
-    SizeOption,
     TimeOption,
     VariantOption,
     WidthOption,
@@ -49,9 +47,10 @@ def view(
     ] = "side-by-side",
     budget: BudgetOption = 2.0,
     tail: TailOption = None,
-    g: SteepnessOption = DENSITY_G,
+    g: SteepnessOption = None,
     model: Annotated[
-        str | None, typer.Option("--model", help="For kbuffer-deep: NAME@ALIAS of the server, fetched and verified.")
+        str | None,
+        typer.Option("--model", help="For kbuffer-deep and -temporal: NAME@ALIAS of the server, fetched and verified."),
     ] = None,
     bundle: Annotated[
         str | None, typer.Option("--bundle", help="Instead: a folder, or NAME@ALIAS of the state folder's registry.")
@@ -69,7 +68,10 @@ def view(
         str | None, typer.Option("--view", help="Name of one of --views, or of a camera. Default: the first.")
     ] = None,
     image_width: WidthOption = 960,
-    picture_size: SizeOption = None,
+    picture_size: Annotated[
+        str | None,
+        typer.Option("--size", help="WIDTHxHEIGHT of one picture, instead of --imageWidth; a window begins with it."),
+    ] = None,
     time: TimeOption = None,
     complexity: ComplexityOption = None,
     refine: RefineOption = None,

@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from labeller.allocation import RULES, Allocation
 from labeller.curves import error_curves
+from labeller.flip_weights import flip_weights
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
 from labeller.shards import write_shard
@@ -34,9 +35,6 @@ def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
     report(0.8, f"{len(RULES)} rules at {len(budgets)} budgets")
     weights = params.get("weights", DEFAULT_WEIGHTS)
     if weights == "flip":
-        # Not at the top: the image of the label role has no FLIP, and no job of the service asks for weights.
-        from labeller.flip_weights import flip_weights
-
         # What is compared with other rules is not weighted; what is learned is.
         counted = flip_weights(dump, [found.k for found in made["optimal"]], params["tail"], params["g"])
         curves = error_curves(dump, params["tail"], params["g"], params["metric"], counted)

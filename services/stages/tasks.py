@@ -36,7 +36,8 @@ _SOURCES: Mapping[StageName, tuple[str, ...]] = {
     ),
     "label": (
         *("labeller", "renderer.allocation", "renderer.features", "renderer.depth_bins", "renderer.dump"),
-        *("schemas.tail", "schemas.colour", "schemas.skips", "schemas.pixel_weights", "renderer.metrics"),
+        *("schemas.tail", "schemas.colour", "schemas.skips", "schemas.pixel_weights"),
+        "renderer.reference.flip",
         *("services.stages.label", "services.stages.allocations"),
     ),
     "train": (

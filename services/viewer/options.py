@@ -56,8 +56,9 @@ class ViewerOptions:
         if self.against not in TECHNIQUES:
             known = ", ".join(TECHNIQUES)
             raise Problem(f"There is no technique '{self.against}'.", f"Choose among: {known}.", ExitCode.NOT_FOUND)
-        if "kbuffer-deep" in (*self.render.techniques, self.against) and self.render.bundle is None:
-            raise Problem("kbuffer-deep needs a bundle.", "Name one with --model or --bundle.")
+        for name in (*self.render.techniques, self.against):
+            if TECHNIQUES[name].needs_bundle and self.render.bundle is None:
+                raise Problem(f"{name} needs a bundle.", "Name one with --model or --bundle.")
         if self.frames is not None and not 1 <= self.frames <= MOST_FRAMES:
             raise Problem(f"{self.frames} frames cannot be rendered.", f"Give 1 to {MOST_FRAMES:,} with --frames.")
         if self.frames is not None and self.out is None:

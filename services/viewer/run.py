@@ -6,10 +6,12 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 
-from renderer.techniques import TECHNIQUES, KBufferDeep, technique
-from schemas.tail import DEFAULT_TAIL
+from renderer.techniques import TECHNIQUES
+from schemas.bundle import load_manifest
+from services.options import chosen_tail
 from services.progress import Progress
 from services.viewer import statistics
+from services.viewer.comparing import Comparer
 from services.viewer.controls import Look, Place
 from services.viewer.headless import frames
 from services.viewer.layout import across
@@ -43,7 +45,6 @@ def view(options: ViewerOptions, service: Service | None, progress: Progress) ->
     with bundle as source, opened(options) as scene:
         for warning in scene.scene.now.scene.warnings:
             progress.note(f"warning: {scene.scene.file}: {warning}")
-        options = _with_tail(options, source.folder)
         if options.frames is not None:
             return _write_frames(options, options.frames, scene, source, progress)
         return _show(options, scene, source, progress)
@@ -63,21 +64,24 @@ def _show(options: ViewerOptions, scene: Opened, source: Source, progress: Progr
     width, height = scene.size
     window = open_window((width * across(options.layout), height), scene.scene.file.name)
     session, place = _session(options, scene, source), _place(scene, source)
-    viewer = Viewer(window, session, place, source, Files(options.out or Path(), options.csv, progress.note))
+    files = Files(options.out or Path(), options.csv, progress.note)
+    viewer = Viewer(window, session, place, source, files, Comparer())
     viewer.run()
     return viewer.rows
 
 
 def _session(options: ViewerOptions, scene: Opened, source: Source) -> Session:
     asked = options.render
-    studio = Studio(scene.scene.gpu(), replace(asked.needs, bundle=source.folder), asked.background, asked.g)
+    trained = None if source.folder is None else load_manifest(source.folder).tail
+    tail = chosen_tail(asked.tail, asked.g, trained)
+    studio = Studio(scene.scene.gpu(), replace(asked.needs, bundle=source.folder), asked.background, tail.g)
     look = Look(
         view=scene.views[0],
         size=scene.size,
         left=asked.techniques[0],
         right=options.against,
         factor=asked.budget,
-        tail=asked.tail or DEFAULT_TAIL,
+        tail=tail.name,
         layout=options.layout,
         perceptual=options.perceptual,
         readout=options.readout,
@@ -87,15 +91,5 @@ def _session(options: ViewerOptions, scene: Opened, source: Source) -> Session:
 
 def _place(scene: Opened, source: Source) -> Place:
     arrays = scene.scene.now.scene
-    names = [name for name in TECHNIQUES if name != "kbuffer-deep" or source.folder is not None]
+    names = [name for name, entry in TECHNIQUES.items() if source.folder is not None or not entry.needs_bundle]
     return Place(names, scene.views, arrays.up, arrays.bounds)
-
-
-def _with_tail(options: ViewerOptions, bundle: Path | None) -> ViewerOptions:
-    """The same with the tail that the network was trained with, where there is one and none is asked for."""
-    if bundle is None or options.render.tail is not None:
-        return options
-    deep = technique("kbuffer-deep", replace(options.render.needs, bundle=bundle))
-    assert isinstance(deep, KBufferDeep)
-    trained = deep.manifest.tail
-    return replace(options, render=replace(options.render, tail=trained.name, g=trained.g))

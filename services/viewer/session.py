@@ -16,11 +16,12 @@ from schemas.view import View
 from services.report.colours import COUNT, HEAT
 from services.stages.pictures import write_png
 from services.viewer import statistics
+from services.viewer.comparing import Compared, Comparer
 from services.viewer.controls import Look, key_help
 from services.viewer.layout import Pane, across, blank, compose, is_paired
 from services.viewer.overlay import Corner, Note, draw, in_columns
 from services.viewer.statistics import Row
-from services.viewer.studio import Compared, Shot, Studio, Wish
+from services.viewer.studio import Shot, Studio, Wish
 from services.writing import replacing
 
 _WRAP = 44
@@ -39,6 +40,7 @@ class Session:
         name: Of the scene.
         bundle: Name of the bundle that is read; empty: none.
         message: What was done last; empty: nothing to say.
+        is_computing: Whether what is shown is being compared with the exact picture.
     """
 
     studio: Studio
@@ -46,6 +48,8 @@ class Session:
     name: str
     bundle: str
     message: str = ""
+    is_computing: bool = False
+    _asked: tuple[Shot, bool] | None = None
 
     def sides(self) -> dict[str, Shot | Problem]:
         """The pictures that the layout shows, `left` and `right`, rendered if they are not there yet."""
@@ -75,14 +79,35 @@ class Session:
             notes.append(Note(textwrap.wrap(self.message, _WRAP), "bottom-right", 0, width))
         return draw(self.image(), notes)
 
-    def compare(self) -> bool:
-        """Compare what is shown with the exact picture; whether there was anything to compare."""
-        new = False
-        for shot in self.sides().values():
-            if isinstance(shot, Shot) and self._known(shot) is None:
-                self.studio.compare(shot, self.look.perceptual)
-                new = True
-        return new
+    def ask(self, comparer: Comparer) -> bool:
+        """Have what is shown compared with the exact picture, one picture after the other.
+
+        However often the look changes meanwhile, one comparison at most is under way that no one waits for.
+
+        Returns:
+            Whether something is shown that is not compared yet.
+        """
+        perceptual = self.look.perceptual
+        missing = [shot for shot in self.sides().values() if isinstance(shot, Shot) and self._known(shot) is None]
+        if missing and self._asked is None:
+            shot = missing[0]
+            try:
+                dump = self.studio.subject(shot.wish).dump
+            except Problem as problem:  # as of a view with more fragments than can be held
+                for each in missing:
+                    self._answered(each, perceptual, problem)
+                return False
+            comparer.ask((shot.wish.view, shot.wish.size), dump, shot.picture(perceptual))
+            self._asked = shot, perceptual
+        return bool(missing)
+
+    def take(self, comparer: Comparer) -> bool:
+        """Take the answer to what was asked; whether it is about a picture that is still there."""
+        found = comparer.answer()
+        if found is None or self._asked is None:
+            return False
+        (shot, perceptual), self._asked = self._asked, None
+        return self._answered(shot, perceptual, found)
 
     def rows(self, frame: int) -> list[Row]:
         """The numbers of what is shown, one row for each picture.
@@ -146,11 +171,17 @@ class Session:
         chosen = [shot for shot in shots if TECHNIQUES[shot.wish.technique].family != "exact"]
         return max((int(shot.rendered.k.max(initial=0)) for shot in chosen or shots), default=1) or 1
 
-    def _known(self, shot: Shot) -> Compared | None:
+    def _answered(self, shot: Shot, perceptual: bool, found: Compared | Problem) -> bool:
+        is_kept = self.studio.remember(shot, perceptual, found)
+        if is_kept and isinstance(found, Problem):
+            self.message = f"{found.title} {found.remedy}"
+        return is_kept
+
+    def _known(self, shot: Shot) -> Compared | Problem | None:
         return self.studio.known(shot, self.look.perceptual)
 
     def _bundle(self, shot: Shot) -> str:
-        return self.bundle if shot.wish.technique == "kbuffer-deep" else ""
+        return self.bundle if TECHNIQUES[shot.wish.technique].needs_bundle else ""
 
     def _notes(self) -> list[Note]:
         look, width = self.look, self.look.size[0]
@@ -179,12 +210,20 @@ class Session:
         passes = ", ".join(f"{name}{_JOINED}{taken:.1f}" for name, taken in shot.recording.host.items())
         times = textwrap.wrap(f"{shot.recording.milliseconds:.1f} ms: {passes}", _WRAP, break_on_hyphens=False)
         lines += [line.replace(_JOINED, " ") for line in times]
-        compared = self._known(shot)
+        known = self._known(shot)
+        compared = known if isinstance(known, Compared) else None
         k = f"k up to {int(rendered.k.max(initial=0))}" if compared is None else "k {}..{}".format(*compared.k)
         of = "" if compared is None else f" of {compared.fragments:,}"
         lines.append(f"captured {rendered.captured:,}{of}, {k}")
         lines.append(f"pool {rendered.pool_bytes / 2**20:.1f} MiB, {rendered.total_bytes / 2**20:.1f} MiB at most")
-        return [*lines, *(["against exact: when the camera rests"] if compared is None else _errors(compared))]
+        return [*lines, *self._against_exact(known)]
+
+    def _against_exact(self, known: Compared | Problem | None) -> list[str]:
+        if isinstance(known, Compared):
+            return _errors(known)
+        if known is not None:
+            return ["against exact: could not be computed"]
+        return ["against exact: computing" if self.is_computing else "against exact: when the camera rests"]
 
 
 def _free_stem(folder: Path, name: str) -> str:

@@ -10,7 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from schemas.problem import ExitCode, Problem
-from services.viewer.studio import Compared, Shot
+from services.viewer.comparing import Compared
+from services.viewer.studio import Shot
 from services.writing import replacing
 
 Row = dict[str, str | int | float | None]

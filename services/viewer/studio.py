@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer import metrics
 from renderer.frame import RGB, Frame
 from renderer.gpu_scene import GpuScene
-from renderer.techniques import Budget, Needs, Rendered, Technique, technique
+from renderer.techniques import TECHNIQUES, Budget, Needs, Rendered, Technique, technique
 from renderer.timing import Recording
 from schemas.colour import display8
 from schemas.problem import Problem
@@ -23,6 +22,7 @@ from schemas.tail import TailName
 from schemas.view import View
 from services.bench.rounds import shoot
 from services.bench.subject import Subject
+from services.viewer.comparing import Compared, Picture, compare
 from services.viewer.layout import Pane
 
 _WARM_SIZE = (64, 48)
@@ -71,26 +71,9 @@ class Shot:
         width, height = self.wish.size
         return Pane(display8(self.rendered.linear), self.rendered.k.reshape(height, width))
 
-
-@dataclass(frozen=True, slots=True)
-class Compared:
-    """A picture against the exact one of its camera; see `services.bench.subject.Errors`.
-
-    Attributes:
-        mse: Of 8-bit sRGB, values in [0,1].
-        mse_display: Of sRGB values before rounding.
-        psnr: dB, of `mse`; None for no error.
-        flip: Mean LDR-FLIP; None if it was not asked for.
-        fragments: N of the view.
-        k: Least and greatest k of a pixel that has fragments.
-    """
-
-    mse: float
-    mse_display: float
-    psnr: float | None
-    flip: float | None
-    fragments: int
-    k: tuple[int, int]
+    def picture(self, perceptual: bool) -> Picture:
+        """As it is compared."""
+        return Picture(self.rendered.linear, self.rendered.k, perceptual)
 
 
 class Studio:
@@ -113,14 +96,15 @@ class Studio:
         self._techniques: dict[str, Technique] = {}
         self._subject: Subject | None = None
         self._made: dict[Wish, Shot | Problem] = {}
-        self._compared: dict[tuple[Wish, bool], Compared] = {}
+        self._compared: dict[tuple[Wish, bool], Compared | Problem] = {}
 
     def load(self, bundle: Path) -> None:
         """Take another bundle for what reads one."""
-        made = technique("kbuffer-deep", replace(self._needs, bundle=bundle))
+        readers = [name for name, entry in TECHNIQUES.items() if entry.needs_bundle]
+        made = {name: technique(name, replace(self._needs, bundle=bundle)) for name in readers}
         self._needs = replace(self._needs, bundle=bundle)
-        self._techniques = {**self._techniques, "kbuffer-deep": made}
-        self._made = {wish: shot for wish, shot in self._made.items() if wish.technique != "kbuffer-deep"}
+        self._techniques = {**self._techniques, **made}
+        self._made = {wish: shot for wish, shot in self._made.items() if wish.technique not in readers}
         self._compared = {key: found for key, found in self._compared.items() if key[0] in self._made}
         self.edition += 1
 
@@ -144,8 +128,8 @@ class Studio:
             subject = self._subject = Subject(self.gpu, wish.view, wish.size, self._background)
         return subject
 
-    def known(self, shot: Shot, perceptual: bool) -> Compared | None:
-        """The comparison of a picture, if it was made."""
+    def known(self, shot: Shot, perceptual: bool) -> Compared | Problem | None:
+        """The comparison of a picture, if it was made, or why it could not be."""
         return self._compared.get((shot.wish, perceptual))
 
     def compare(self, shot: Shot, perceptual: bool) -> Compared:
@@ -156,9 +140,17 @@ class Studio:
             perceptual: Whether FLIP is computed, which takes longer than all else.
         """
         found = self.known(shot, perceptual)
-        if found is None:
-            found = self._compared[shot.wish, perceptual] = _compare(self.subject(shot.wish), shot, perceptual)
+        if not isinstance(found, Compared):
+            found = compare(self.subject(shot.wish).reference, shot.picture(perceptual))
+            self._compared[shot.wish, perceptual] = found
         return found
+
+    def remember(self, shot: Shot, perceptual: bool, found: Compared | Problem) -> bool:
+        """Keep a comparison that was made elsewhere; whether its picture is still one of those of this camera."""
+        is_kept = self._made.get(shot.wish) is shot
+        if is_kept:
+            self._compared[shot.wish, perceptual] = found
+        return is_kept
 
     def _shoot(self, subject: Subject, wish: Wish) -> Shot:
         if wish.technique not in self._techniques:
@@ -179,17 +171,3 @@ class Studio:
         """What `kbuffer-optimal` renders of the view under way."""
         assert self._subject is not None
         return self._subject.allocate(frame, budget)
-
-
-def _compare(subject: Subject, shot: Shot, perceptual: bool) -> Compared:
-    image, counts = display8(shot.rendered.linear), subject.dump.counts
-    error = metrics.mse(image, subject.exact8)
-    k = shot.rendered.k[counts > 0]
-    return Compared(
-        mse=error,
-        mse_display=subject.display_error(shot.rendered.linear.reshape(-1, 3)),
-        psnr=None if error == 0.0 else metrics.psnr(error),
-        flip=metrics.flip(image, subject.exact8)[0] if perceptual else None,
-        fragments=int(counts.sum(dtype=np.int64)),
-        k=(int(k.min()), int(k.max())) if len(k) else (0, 0),
-    )

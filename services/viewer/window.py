@@ -1,6 +1,7 @@
 """The window: shows what a session composes, and turns keys and mouse into another look.
 
-Nothing is rendered while nothing changes. When the camera rests, what is shown is compared with the exact picture.
+Nothing is rendered while nothing changes. When the camera rests, what is shown is compared with the exact picture, in a
+process of its own: the window goes on meanwhile.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from renderer.context import adopt, limit_threads
 from schemas.problem import ExitCode, Problem
 from services.viewer import statistics
+from services.viewer.comparing import Comparer
 from services.viewer.controls import KEYS, PICTURES, STATISTICS, Look, Place, pan, turn, zoom
 from services.viewer.headless import STATISTICS as FILE
 from services.viewer.layout import across
@@ -25,7 +27,7 @@ from services.viewer.session import Session
 from services.viewer.statistics import Row
 
 REST = 0.4
-"""Seconds without a change after which the exact picture is made."""
+"""Seconds without a change after which what is shown is compared with the exact picture."""
 _TICK = 0.02
 """Seconds between two looks at keys and mouse while nothing changes."""
 _GRIP = 12
@@ -119,16 +121,19 @@ class Viewer:
         place: What movements are relative to.
         source: The bundle and its successors.
         files: Where keys write to.
+        comparer: Compares with the exact picture; `run` closes it.
 
     Attributes:
         rows: Statistics that were written.
     """
 
-    def __init__(self, window: Any, session: Session, place: Place, source: Source, files: Files) -> None:
+    def __init__(
+        self, window: Any, session: Session, place: Place, source: Source, files: Files, comparer: Comparer
+    ) -> None:
         self.window, self.session, self.rows = window, session, list[Row]()
-        self._place, self._source, self._files = place, source, files
+        self._place, self._source, self._files, self._comparer = place, source, files, comparer
         self._drawn: tuple[Look, int, str] | None = None
-        self._changed, self._is_compared, self._is_done = time.monotonic(), False, False
+        self._changed, self._is_done = time.monotonic(), False
         self._holds_divider, self._is_led = False, False
         self._seconds, self._scale = 0.0, 1
         ctx: moderngl.Context = window.ctx
@@ -147,9 +152,12 @@ class Viewer:
 
     def run(self) -> None:
         """Show it until the window is closed."""
-        while not (self._is_done or self.window.is_closing):
-            if not self.step():
-                time.sleep(_TICK)
+        try:
+            while not (self._is_done or self.window.is_closing):
+                if not self.step():
+                    time.sleep(_TICK)
+        finally:
+            self._comparer.close()
 
     def step(self) -> bool:
         """Render what changed, show it, and take what keys and mouse did meanwhile; whether anything changed."""
@@ -159,12 +167,12 @@ class Viewer:
         state = session.look, session.studio.edition, session.message
         is_new = state != self._drawn
         if is_new:
-            self.window.title = session.title
+            self.window.title, session.is_computing = session.title, False
             self._upload()
-            self._drawn, self._changed, self._is_compared = state, time.monotonic(), False
-        elif not (self._is_compared or self._is_led) and time.monotonic() - self._changed > REST:
-            self._is_compared = is_new = True
-            self._compare()
+            self._drawn, self._changed = state, time.monotonic()
+        elif self._compare():
+            is_new = True
+            self._upload()
         self._show()
         return is_new
 
@@ -210,12 +218,13 @@ class Viewer:
         """The wheel turned."""
         self.session.look = zoom(self.session.look, self._place, _ZOOM**dy)
 
-    def _compare(self) -> None:
-        try:
-            if self.session.compare():
-                self._upload()
-        except Problem as problem:  # as of a view with more fragments than can be held
-            self.session.message = f"{problem.title} {problem.remedy}"
+    def _compare(self) -> bool:
+        """Have what is shown compared while nothing changes; whether there is something new to say of it."""
+        session, before = self.session, self.session.is_computing
+        has_come = session.take(self._comparer)
+        if not self._is_led and time.monotonic() - self._changed > REST:
+            session.is_computing = session.ask(self._comparer)
+        return has_come or session.is_computing != before
 
     def _follow(self) -> None:
         """Take a bundle that has come meanwhile."""

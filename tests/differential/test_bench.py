@@ -13,6 +13,7 @@ from support.scenes import VIEW, shells
 from labeller.reference import exact, pixel_of
 from renderer.gpu_scene import GpuScene
 from renderer.techniques import TECHNIQUES, Budget, KBuffer, Rendered, SBuffer
+from renderer.techniques.kbuffer_temporal import SETTLED
 from renderer.timing import READBACK
 from schemas.bench import LOSSLESS, BenchCell, CellKey, Yardstick
 from schemas.colour import display8, linear_to_srgb
@@ -195,6 +196,13 @@ def test_what_takes_long_is_timed_less_often(subject: Subject, cost: float | Non
     in_turns(subject, [run], 5, limit)
     assert slow.frames == frames
     assert len(run.recordings) == max(1, frames - 1)
+
+
+@pytest.mark.parametrize(("name", "frames"), [("kbuffer-deep", 1), ("kbuffer-temporal", SETTLED)])
+def test_what_learns_from_its_frames_is_measured_when_it_has_settled(subject: Subject, name: str, frames: int) -> None:
+    slow = Slow()
+    Run(CellKey(technique=name, basis="none"), slow, Budget(1)).first(subject, 100.0)
+    assert slow.frames == frames
 
 
 def test_a_picture_that_is_not_finite_is_no_result(subject: Subject, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,13 +1,11 @@
-"""Fixtures of the dashboard's tests: services with something of everything and with nothing, and a browser."""
+"""Fixtures of the dashboard's tests: services with something of everything and with nothing."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import pytest
 from support.api import Api
-from support.browser import CHROMIUM, browser
 from support.dashboard import Shown, fill
 
 
@@ -34,13 +32,3 @@ def url(api: Api) -> Iterator[str]:
     """Where `api` is served."""
     with api.served() as address:
         yield address
-
-
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """A headless browser."""
-    pytest.importorskip("playwright.sync_api")
-    if CHROMIUM is None:
-        pytest.skip("chromium is not installed")
-    with browser(tmp_path_factory.mktemp("browser")) as started:
-        yield started

@@ -146,6 +146,7 @@ def stopped(arguments: list[str], views: int, sent: signal.Signals, status: int)
         (["SCENE", "--camera", ""], ExitCode.NOT_FOUND, "has no camera ''"),
         (["SCENE", "-t", "magic"], ExitCode.NOT_FOUND, "There is no technique 'magic'."),
         (["SCENE", "-t", "kbuffer-deep"], ExitCode.USAGE, "kbuffer-deep needs a bundle."),
+        (["SCENE", "--bundle", ".", "--g", "0.5"], ExitCode.USAGE, "the bundle brings its own, with its own g."),
         (["SCENE", "--bundle", "."], ExitCode.NOT_FOUND, ". is not a bundle"),
     ],
 )

@@ -322,6 +322,8 @@ def test_all_options_of_a_job_arrive(server: FakeServer, folder: Path) -> None:
         "--no-replay",
         "--patience",
         "4",
+        "--weights",
+        "flip",
         "--promote",
         "never",
         "--priority",
@@ -354,6 +356,7 @@ def test_all_options_of_a_job_arrive(server: FakeServer, folder: Path) -> None:
         "start_from": "champion",
         "replay": False,
         "patience": 4,
+        "weights": "flip",
         "promote": "never",
         "priority": "high",
     }

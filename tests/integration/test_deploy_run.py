@@ -124,7 +124,7 @@ def test_together_they_build_from_upload_to_published_version(running: Running, 
         (tmp_path / name).write_text(SCENE.format(radius=radius), encoding="utf-8")
         scenes.append(str(tmp_path / name))
     options = ["--name", "tiny", "--size", "64x48", "--budgets", "1", "--alpha", "0.5", "--steps", "20"]
-    options += ["--views-per-scene", "1"]
+    options += ["--views-per-scene", "1", "--weights", "flip"]  # which needs FLIP where labels are made
     submitted = running.cli("jobs", "submit", "build", "--scene", *scenes[:1], "--holdout", scenes[1], *options)
     job = _ended(running, submitted["id"])
     tasks = running.cli("jobs", "tasks", job["id"])["tasks"]

@@ -278,6 +278,7 @@ def test_quarantined_views_are_named_in_the_table(server: FakeServer, capsys: py
         (["--max-regression", "nan"], "is not a fraction"),
         (["--baseline", "glass@1.0.0"], "--baseline 'glass@1.0.0' is not known"),
         (["--patience", "-1"], "patience"),
+        (["--weights", "mine"], "There are no weights 'mine'."),
         (["--budgets", "0"], "budgets.0"),
         (["--size", "big"], "is not a size"),
         (["--holdout", "cups.usdz", "--holdout", "leaves.usdz"], "every scene is held out"),
@@ -314,6 +315,7 @@ def test_the_script_passes_and_writes_where_a_workflow_looks(server: FakeServer,
     better(server)
     options = {"RETRAIN_BUDGETS": "1,2", "RETRAIN_SIZE": "64x48", "RETRAIN_STEPS": "9", "RETRAIN_PROMOTE": "true"}
     options |= {"RETRAIN_START_FROM": "scratch", "RETRAIN_REPLAY": "false", "RETRAIN_PATIENCE": "2"}
+    options |= {"RETRAIN_WEIGHTS": "flip"}
     pages = {"GITHUB_STEP_SUMMARY": "page.md", "GITHUB_OUTPUT": "outputs", "RETRAIN_SUMMARY": "table.md"}
     done = script(folder, server, **options, **pages)
     assert done.returncode == ExitCode.OK, done.stderr
@@ -324,6 +326,7 @@ def test_the_script_passes_and_writes_where_a_workflow_looks(server: FakeServer,
     spec = server.jobs[job_id]["spec"]
     assert (spec["budgets"], spec["width"], spec["height"], spec["steps"]) == ([1.0, 2.0], 64, 48, 9)
     assert (spec["start_from"], spec["replay"], spec["patience"]) == ("scratch", False, 2)
+    assert spec["weights"] == "flip"
     assert [use["holdout"] for use in spec["scenes"]] == [True, False, False, True]
     assert KEY not in done.stdout + done.stderr
 

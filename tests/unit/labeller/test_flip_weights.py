@@ -10,7 +10,8 @@ from support.dumps import random_dump
 from labeller.curves import composite, error_curves
 from labeller.flip_weights import MOST, UNSEEN_ERROR, UNSEEN_FLIP, flip_weights
 from labeller.rules import allocate_curves
-from renderer.metrics import flip
+from renderer import metrics
+from renderer.reference.flip import flip
 from schemas.colour import display8, linear_to_srgb
 from schemas.fragments import FragmentDump
 
@@ -23,7 +24,7 @@ KEPT = [found.k for found in allocate_curves(DUMP, CURVES, BUDGETS, "optimal")]
 
 def flip_of(dump: FragmentDump, k: NDArray[np.integer]) -> float:
     shown, exact = (display8(composite(dump, kept)).reshape(dump.height, -1, 3) for kept in (k, dump.counts))
-    return flip(shown, exact)[0]
+    return metrics.flip(shown, exact)[0]
 
 
 @pytest.mark.parametrize("kept", [KEPT[:1], KEPT])
@@ -41,7 +42,7 @@ def test_weights_are_positive_and_one_on_average(kept: list[NDArray[np.int32]]) 
 def test_a_weight_is_what_flip_makes_of_a_squared_error() -> None:
     """The plain form: one pixel after the other."""
     shown, exact = composite(DUMP, KEPT[0]), composite(DUMP, DUMP.counts)
-    _, seen = flip(display8(shown).reshape(DUMP.height, -1, 3), display8(exact).reshape(DUMP.height, -1, 3))
+    seen = flip(display8(shown).reshape(DUMP.height, -1, 3), display8(exact).reshape(DUMP.height, -1, 3))
     slopes = {}
     for p in np.flatnonzero(OPEN).tolist():
         squared = sum((linear_to_srgb(shown[p, c]) - linear_to_srgb(exact[p, c])) ** 2 for c in range(3))

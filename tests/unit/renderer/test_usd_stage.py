@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pxr import Gf, Usd, UsdGeom
+from pydantic import ValidationError
 from support.stages import stage, triangle, world
 
 from renderer.scene import LoadOptions, load_scene
 from renderer.usd.native import Likeness
+from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 from schemas.scene import SceneArrays
 from schemas.view import View
@@ -323,6 +325,19 @@ def test_aperture_offsets_shift_the_picture_as_gfcamera_does(tmp_path: Path, pro
     window = view.projection(1.5, camera.clippingRange.min, camera.clippingRange.max)
     np.testing.assert_allclose(window, expected, atol=1e-5)
     assert isinstance(camera, Gf.Camera)
+
+
+def test_a_camera_s_name_fits_into_an_address_or_is_a_problem(tmp_path: Path) -> None:
+    most = "c" * LIMITS.view_name
+    camera = 'def Xform "%s" { def Camera "%s" { } }\n'
+    (view,) = load_scene(stage(tmp_path, triangle() + camera % ("A", most))).cameras
+    assert view.name == most
+    for cameras in (camera % ("A", f"{most}c"), camera % ("A", most) + camera % ("B", most)):  # the second is numbered
+        with pytest.raises(Problem, match=f"at most {LIMITS.view_name}") as refused:
+            load_scene(stage(tmp_path, triangle() + cameras))
+        assert refused.value.code == ExitCode.LIMIT
+    with pytest.raises(ValidationError):
+        View(name=f"{most}c", eye=(0.0, 0.0, 1.0), target=(0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
 
 
 def test_a_view_without_a_shift_reads_and_looks_as_before() -> None:

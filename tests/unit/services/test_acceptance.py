@@ -122,7 +122,7 @@ def test_what_was_learned_cannot_be_held_out(home: Home) -> None:
     assert caught.value.code is ExitCode.CHECK_FAILED
 
 
-@pytest.mark.parametrize("change", [{"tail": "exact-coverage"}, {"g": 0.5}, {"seed": 1}])
+@pytest.mark.parametrize("change", [{"tail": "exact-coverage"}, {"g": 0.5}, {"seed": 1}, {"weights": "flip"}])
 def test_labels_of_another_kind_are_refused(home: Home, change: dict[str, Any]) -> None:
     with pytest.raises(Problem, match=f"trained on is labelled otherwise: {next(iter(change))} ") as caught:
         home.accept(spec(**change))
@@ -137,10 +137,13 @@ def test_a_data_set_is_compared_by_its_own_settings(home: Home) -> None:
     refs = [ShardRef(scene="both", scene_digest="5" * 64, **shard)]  # type: ignore[arg-type]
     fits = home.measured.record_dataset(plan.settings, refs, None).id
     other = home.measured.record_dataset({**plan.settings, "seed": 4}, refs, None).id
+    weighted = home.measured.record_dataset({**plan.settings, "weights": "flip"}, refs, None).id
     wanted = spec(kind="train", scenes=[], dataset=fits, seed=9)
     assert [digest for digest, _ in home.plan(wanted).replayed] == [OLD.digest]
     with pytest.raises(Problem, match="seed 0 instead of 4"):
         home.accept(spec(kind="train", scenes=[], dataset=other))
+    with pytest.raises(Problem, match="weights none instead of flip"):
+        home.accept(spec(kind="train", scenes=[], dataset=weighted))
 
 
 def test_a_name_without_a_champion_begins_from_scratch_and_says_so(home: Home) -> None:
@@ -181,7 +184,7 @@ def test_retention_leaves_what_a_job_may_replay(home: Home) -> None:
 
 
 def test_a_job_of_before_has_the_addresses_of_before(home: Home) -> None:
-    old = spec(start="champion", name="glass").model_dump(mode="json", exclude={"replay", "patience"})
+    old = spec(start="champion", name="glass").model_dump(mode="json", exclude={"replay", "patience", "weights"})
     stored = JobSpec.model_validate(old)
     plan = home.plan(stored)
     assert (plan.start, plan.replayed, plan.patience, plan.from_champion) == (None, (), 0, True)
@@ -195,6 +198,20 @@ def test_what_trains_nothing_begins_with_nothing(kind: str) -> None:
     with pytest.raises(ValueError, match="trains nothing"):
         spec(kind=kind, model="glass")
     assert spec(kind=kind, model="glass", start="champion").begins_with is None, "it was allowed before"
+
+
+@pytest.mark.parametrize(
+    ("wanted", "words"),
+    [
+        ({"kind": "render"}, "a render makes no rows"),
+        ({"kind": "evaluate", "model": "glass"}, "an evaluate makes no rows"),
+        ({"kind": "train", "scenes": [], "dataset": "dst_" + "0" * 32}, "the rows of a data set were weighted"),
+        ({"weights": "saliency"}, "'none' or 'flip'"),
+    ],
+)
+def test_weights_are_for_jobs_that_label(wanted: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        spec(start="scratch", **{"weights": "flip", **wanted})
 
 
 @given(

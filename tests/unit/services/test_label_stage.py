@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,6 +12,7 @@ import numpy as np
 import pytest
 import zarr
 from support.dumps import random_dump
+from support.processes import BLOCKED, ROOT, missing_from
 
 from labeller.allocation import RULES
 from labeller.curves import error_curves
@@ -86,6 +90,13 @@ def test_the_shard_is_the_one_that_the_facts_name(facts: Facts, folder: Path) ->
     assert facts["shard"]["bytes"] == shard.stat().st_size
     assert read_shard(shard).meta.sampling.seed == 3
     assert [level.budget for level in read_shard(shard).meta.levels if level.scored] == [N // 4, N // 2]
+
+
+def test_the_image_of_the_label_role_has_all_that_every_kind_of_labels_needs() -> None:
+    environment = {**os.environ, "PYTHONPATH": f"{BLOCKED}:{ROOT}", "BLOCKED_IMPORTS": ",".join(missing_from("label"))}
+    code = "import services.stages.label, sys; print('flip_evaluator' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("False\n", "")
 
 
 def test_weights_are_in_the_rows_alone(facts: Facts, folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:

@@ -8,10 +8,14 @@ from typing import Any
 
 import pytest
 
+from schemas.bundle import TailSpec
 from schemas.problem import ExitCode, Problem
+from schemas.tail import TailName
 from services.options import (
     BuildOptions,
     check_budget,
+    check_steepness,
+    chosen_tail,
     default_holdout,
     parse_budgets,
     parse_size,
@@ -26,6 +30,33 @@ def scenes(tmp_path: Path) -> tuple[Path, ...]:
     for path in paths:
         path.write_text("#usda 1.0\n")
     return paths
+
+
+@pytest.mark.parametrize(
+    ("tail", "g", "trained", "expected"),
+    [
+        (None, None, None, ("density-16", 0.75)),
+        (None, 2.0, None, ("density-16", 2.0)),
+        (None, None, ("density", 0.5), ("density", 0.5)),
+        ("density", None, ("density", 0.5), ("density", 0.5)),
+        ("density", 2.0, ("density", 0.5), ("density", 2.0)),
+        ("density-8", None, ("density", 0.5), ("density-8", 0.75)),
+    ],
+)
+def test_a_tail_is_the_one_asked_for_else_the_bundle_s_else_the_usual_one(
+    tail: TailName | None, g: float | None, trained: tuple[TailName, float] | None, expected: tuple[str, float]
+) -> None:
+    found = chosen_tail(tail, g, None if trained is None else TailSpec(name=trained[0], g=trained[1]))
+    assert (found.name, found.g) == expected
+
+
+def test_a_steepness_beside_a_bundle_needs_the_tail_that_it_is_of() -> None:
+    for has_bundle, is_tail_named in ((False, False), (False, True), (True, True)):
+        check_steepness(0.5, has_bundle=has_bundle, is_tail_named=is_tail_named)
+    check_steepness(None, has_bundle=True, is_tail_named=False)
+    with pytest.raises(Problem, match="the bundle brings its own") as caught:
+        check_steepness(0.5, has_bundle=True, is_tail_named=False)
+    assert caught.value.remedy == "Leave out --g, or name the tail as well: --tail density --g 0.5."
 
 
 def test_budgets_are_sorted_and_unique(scenes: tuple[Path, ...]) -> None:

@@ -221,6 +221,18 @@ def test_a_data_set_is_trained_on_with_the_settings_it_was_made_with() -> None:
     assert runner.of("train")[0].params["seed"] == 7
 
 
+def test_weights_of_a_job_are_in_the_keys_of_its_labels_and_in_its_bundle() -> None:
+    usual, named, weighted = TableRunner(), TableRunner(), TableRunner()
+    for runner, more in ((usual, {}), (named, {"weights": "none"}), (weighted, {"weights": "flip"})):
+        run(runner, spec(**more))
+    assert {task.params["weights"] for task in weighted.of("label")} == {"flip"}
+    assert weighted.of("export")[0].params["settings"]["weights"] == "flip"
+    assert weighted.of("render") == usual.of("render")
+    for stage in ("label", "train", "export"):
+        assert named.of(stage) == usual.of(stage), "artifacts from before are still found"
+        assert not {task.artifact for task in weighted.of(stage)} & {task.artifact for task in usual.of(stage)}
+
+
 def test_what_does_not_change_a_picture_does_not_change_its_address() -> None:
     one, other = TableRunner(), TableRunner()
     run(one, spec())

@@ -25,7 +25,7 @@ from services.render_options import (
 def test_techniques_come_by_name_in_lists_or_all() -> None:
     assert parse_techniques((), False) == ("sbuffer",)
     assert parse_techniques(("kbuffer, sbuffer", "kbuffer"), False) == ("kbuffer", "sbuffer")
-    assert set(parse_techniques(("all",), False)) == set(TECHNIQUES) - {"kbuffer-deep"}
+    assert set(parse_techniques(("all",), False)) == set(TECHNIQUES) - {"kbuffer-deep", "kbuffer-temporal"}
     assert set(parse_techniques(("all",), True)) == set(TECHNIQUES)
     with pytest.raises(Problem) as caught:
         parse_techniques(("zbuffer",), False)
@@ -93,6 +93,7 @@ def test_inference_is_one_of_those_there_are() -> None:
         {"budget": 1e-9, "size": (320, 200)},
         {"bundle": ""},
         {"g": -1.0},
+        {"g": 0.5, "bundle": "glass"},
         {"image_width": 0},
         {"size": (10, 100_000)},
         {"size": (0, 0)},

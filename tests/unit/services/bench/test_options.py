@@ -42,11 +42,16 @@ def options(tmp_path: Path) -> BenchOptions:
         ),
         ({"sizes": ((15, 100),)}, "15 pixels are no side of a picture here."),
         ({"g": -1.0}, "--g -1.0 is not between 0 and 10."),
+        (
+            {"g": 0.5, "bundle": "glass"},
+            "--g 0.5 is the steepness of a tail, and none is named: the bundle brings its own, with its own g.",
+        ),
         ({"repeats": 0}, "--repeats 0 cannot be used."),
         ({"most_views": 0}, "--most-views 0 cannot be used."),
         ({"path": 1}, "--path 1 cannot be used."),
         ({"limit": 0.0}, "--limit 0.0 is no time."),
         ({"techniques": ("kbuffer-deep",)}, "kbuffer-deep needs a bundle."),
+        ({"techniques": ("kbuffer-temporal",)}, "kbuffer-temporal needs a bundle."),
     ],
 )
 def test_options_that_cannot_be_are_problems(options: BenchOptions, change: dict[str, Any], title: str) -> None:

@@ -14,8 +14,9 @@ from renderer.techniques import Budget, Rendered
 from renderer.timing import Recording
 from schemas.problem import Problem
 from schemas.view import View
+from services.viewer.comparing import Compared
 from services.viewer.statistics import COLUMNS, append, check, row, write
-from services.viewer.studio import Compared, Shot, Wish
+from services.viewer.studio import Shot, Wish
 
 VIEW = View(name="front", eye=(0.0, 0.0, 5.0), target=(0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import queue
+from collections.abc import Hashable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -16,10 +17,13 @@ from renderer import context
 from renderer.gpu_scene import GpuScene
 from renderer.techniques import Budget, KBuffer, Needs, Rendered, SBuffer, Technique
 from renderer.timing import Recording
+from schemas.fragments import FragmentDump
 from schemas.problem import Problem
+from services.bench.exact import Exact
 from services.bench.rounds import shoot
 from services.bench.subject import Subject
 from services.viewer import window as module
+from services.viewer.comparing import Compared, Comparer, Picture, compare
 from services.viewer.controls import KEYS, Look, Place
 from services.viewer.model import Source
 from services.viewer.session import Session
@@ -62,6 +66,26 @@ class Window:
         return rows.reshape(self.height, self.width, 3)[::-1]
 
 
+class Beside(Comparer):
+    """Compares at once, and answers when it may."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.views: list[Hashable] = []
+        self.may_answer, self.found = True, None
+
+    def ask(self, view: Hashable, dump: FragmentDump, picture: Picture) -> None:
+        assert not self.is_busy
+        self.views.append(view)
+        self.is_busy, self.found = True, compare(Exact(dump), picture)
+
+    def answer(self) -> Compared | Problem | None:
+        if not (self.is_busy and self.may_answer):
+            return None
+        self.is_busy = False
+        return self.found
+
+
 @pytest.fixture(scope="module")
 def gpu(gl: moderngl.Context) -> GpuScene:
     return GpuScene(gl, shells())
@@ -79,7 +103,7 @@ def make(gpu: GpuScene, ctx: moderngl.Context, tmp_path: Path, bundle: Path | No
     place = Place(("kbuffer", "sbuffer", "kbuffer-optimal"), (VIEW,), (0.0, 1.0, 0.0), gpu.scene.bounds)
     source = Source(bundle, "glass@champion" if bundle else "", queue.SimpleQueue())
     files = Files(tmp_path / "out", None, lambda _: None)
-    return Viewer(Window(ctx), Session(studio, look, "shells", source.name), place, source, files)
+    return Viewer(Window(ctx), Session(studio, look, "shells", source.name), place, source, files, Beside())
 
 
 def press(viewer: Viewer, name: str, shift: bool = False) -> None:
@@ -100,12 +124,12 @@ def test_the_read_out_says_what_it_costs_and_how_far_off_it_is(viewer: Viewer) -
     session = viewer.session
     shot = session.sides()["left"]
     before = session._lines("left", shot)
-    session.compare()
+    session.rows(0)
     lines = session._lines("left", shot)
     assert before[:2] == lines[:2] == ["kbuffer", "F 1 a pixel, 7,200; tail density-16"]
     assert before[-1] == "against exact: when the camera rests"
     compared = session.studio.known(shot, False)  # type: ignore[arg-type]
-    assert compared is not None
+    assert isinstance(compared, Compared)
     assert f"MSE {1e5 * compared.mse:.4g} x1e-5, PSNR {compared.psnr:.2f} dB" in lines[-1]
     assert f"of {compared.fragments:,}, k {compared.k[0]}..{compared.k[1]}" in " ".join(lines)
     # A pass and its time are on one line, in letters that the font has.
@@ -131,10 +155,10 @@ def test_nothing_is_rendered_while_nothing_changes(viewer: Viewer, monkeypatch: 
     assert viewer.step()
     shots = viewer.session.sides()
     assert not viewer.step()
-    assert viewer.session.studio.known(shots["left"], False) is None  # type: ignore[arg-type]
+    assert known(viewer, "left") is None
     now[0] += module.REST + 0.1
-    assert viewer.step()  # at rest: compared with the exact picture
-    assert viewer.session.studio.known(shots["left"], False) is not None  # type: ignore[arg-type]
+    assert [viewer.step() for _ in range(4)] == [True, True, True, False]  # asked for; the left one; the right one
+    assert [isinstance(known(viewer, side), Compared) for side in shots] == [True, True]
     now[0] += 10.0
     assert not viewer.step()
     assert viewer.session.sides()["left"] is shots["left"]
@@ -143,6 +167,69 @@ def test_nothing_is_rendered_while_nothing_changes(viewer: Viewer, monkeypatch: 
     press(viewer, "A")
     viewer.step()
     assert viewer.session.sides()["left"] is shots["left"]  # going back renders nothing
+
+
+def test_while_it_is_compared_the_window_goes_on_and_shows_no_answer_to_what_it_left(
+    viewer: Viewer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [100.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+    beside: Beside = viewer._comparer  # type: ignore[assignment]
+    beside.may_answer = False
+    viewer.step()
+    now[0] += module.REST + 0.1
+    viewer.step()
+    assert said(viewer) == "against exact: computing"
+    assert not viewer.step(), "nothing is drawn while it is waited for"
+    for _ in range(5):  # quick switching: whoever looks does not wait, and nothing is queued
+        press(viewer, "RIGHT")
+        assert viewer.step()
+        assert said(viewer) == "against exact: when the camera rests"
+        now[0] += module.REST + 0.1
+        viewer.step()
+        assert said(viewer) == "against exact: computing"
+    assert len(beside.views) == 1
+    beside.may_answer = True
+    viewer.step()
+    assert known(viewer, "left") is None, "the answer is about another camera"
+    for _ in range(3):
+        viewer.step()
+    look = viewer.session.look
+    assert beside.views[1:] == [(look.view, look.size)] * 2
+    assert said(viewer).startswith("against exact: MSE")
+    beside.may_answer = False
+    press(viewer, "F")
+    viewer.step()
+    assert said(viewer) == "against exact: when the camera rests", "FLIP was not computed"
+
+
+def test_a_comparison_that_fails_is_said_once(viewer: Viewer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "REST", -1.0)
+    beside: Beside = viewer._comparer  # type: ignore[assignment]
+    press(viewer, "NUMBER_1")
+    for _ in range(2):
+        viewer.step()
+    beside.found = Problem("It ended.", "Make the window smaller.")
+    for _ in range(3):
+        viewer.step()
+    assert viewer.session.message == "It ended. Make the window smaller."
+    assert said(viewer) == "against exact: could not be computed"
+    assert not viewer.step()
+    assert len(beside.views) == 1
+    assert viewer.session.rows(0)[0]["mse"], "statistics are computed when they are asked for"
+
+
+def known(viewer: Viewer, side: str) -> Compared | Problem | None:
+    """What is known of a picture that is shown."""
+    shot = viewer.session.sides()[side]
+    return viewer.session.studio.known(shot, viewer.session.look.perceptual)  # type: ignore[arg-type]
+
+
+def said(viewer: Viewer) -> str:
+    """The read-out's word about the left picture's error."""
+    session = viewer.session
+    lines = session._lines("left", session.sides()["left"])
+    return next(line for line in lines if line.startswith("against exact"))
 
 
 def test_the_mouse_turns_moves_and_zooms(viewer: Viewer) -> None:
