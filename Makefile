@@ -30,7 +30,8 @@ lint: setup ## style, types, direction of imports
 setup-tests: setup
 	@scripts/setup-tests.sh
 
-test: setup-tests lint ## lint, then all tests
+test: setup ## lint, then all tests
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target setup-tests lint
 	@BIN=$(BIN) scripts/test.sh $(ARGS)
 
 format: setup ## rewrite the sources in the house style

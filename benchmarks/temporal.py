@@ -49,6 +49,8 @@ STEPS = (0.1, 0.45, 2.0)
 MOVING = 6
 """Frames in motion."""
 COMPARED = ("kbuffer-deep", "kbuffer-temporal")
+STEADY = 1e-5
+"""Flicker that nobody sees: a step of an 8-bit value in one value of 400."""
 
 JSON = dict[str, Any]
 
@@ -106,8 +108,9 @@ def measure(subject: Subject, budget: int, bundle: Path) -> JSON:
         bundle: Folder of a bundle.
 
     Returns:
-        `still`: frame -> error over that of `kbuffer-deep`; `moving`: degrees -> `error` and `flicker` likewise, and
-        `k`, the mean change of k from frame to frame of both; `milliseconds`: of a frame over that of the other.
+        `still`: frame -> error over that of `kbuffer-deep`; `moving`: degrees -> `error` and `flicker` likewise, the
+        latter None where neither reaches `STEADY`, and `k`, the mean change of k from frame to frame of both;
+        `milliseconds`: of a frame over that of the other.
     """
     spec = load_manifest(bundle).tail
     given = Budget(budget, spec.name, spec.g)
@@ -137,9 +140,10 @@ def _moving(subject: Subject, budget: Budget, bundle: Path, step: float) -> JSON
     error = {name: sum(shot.error for shot in shots[1:]) for name, shots in seen.items()}
     changes = {name: _changes(views, shots) for name, shots in seen.items()}
     plain, learning = COMPARED
+    flicker, still = changes[learning][0], changes[plain][0]
     return {
         "error": over(error[learning] / MOVING, error[plain] / MOVING),
-        "flicker": changes[learning][0] / max(changes[plain][0], 1e-9),
+        "flicker": None if max(flicker, still) < STEADY else flicker / max(still, STEADY),
         "k": [changes[name][1] for name in COMPARED],
     }
 
@@ -172,7 +176,8 @@ def _subjects(scenes: Path, wanted: Sequence[str]) -> Iterator[tuple[str, Subjec
 
 def page(found: Mapping[str, Any]) -> str:
     """The results as Markdown."""
-    about = ", ".join(found["machine"].values())
+    on = found["machine"]
+    about = f"{on['processor']}, {on['cores']} cores, {on['memory']}"
     lines = [
         "# Learning from the last frame, measured\n",
         f"```\n{found['command']} --bundle FOLDER --out benchmarks/results/temporal.json \\\n"
@@ -181,7 +186,8 @@ def page(found: Mapping[str, Any]) -> str:
         f"factors, below 1 is better, errors with 1e-7 added as in scores; opacity {ALPHA:g}, {SIZE[0]}x{SIZE[1]}.\n"
         f"*At rest*: so many frames after the first. *Moving*: an orbit of so many degrees a frame, after {REST}\n"
         f"frames at rest; means over {MOVING} frames. *k*: mean change of k from frame to frame without and with\n"
-        "learning, at .45 degrees. *Time*: of a frame, median of frames in turns.\n",
+        "learning, at .45 degrees. *Time*: of a frame, median of frames in turns. A dash: neither flickers by\n"
+        f"{STEADY:g} of the display's range.\n",
         f"Bundle: {found['bundle']}; *{about}; {found['created']}.*\n",
         "| scene | F / WH | " + " | ".join(f"at rest, {frame}" for frame in SHOWN) + " | "
         "" + " | ".join(f"error, {step:g}°" for step in STEPS) + " | "
@@ -192,9 +198,13 @@ def page(found: Mapping[str, Any]) -> str:
         moving = [row["moving"][str(step)] for step in STEPS]
         numbers = [*row["still"].values(), *(each["error"] for each in moving), *(each["flicker"] for each in moving)]
         k = " → ".join(f"{value:.2f}" for value in row["moving"][str(STEPS[1])]["k"])
-        cells = [row["scene"], f"{row['budget_factor']:g}", *(f"{value:.2f}" for value in numbers), k]
+        cells = [row["scene"], f"{row['budget_factor']:g}", *map(_number, numbers), k]
         lines.append(f"| {' | '.join(cells)} | {row['milliseconds']:.2f} |")
     return "\n".join(lines) + "\n"
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2f}"
 
 
 def _parse() -> argparse.Namespace:

@@ -17,26 +17,28 @@ have_zink() {
         .venv/bin/python -m renderer.context 2>/dev/null | grep -q '^zink'
 }
 
-if ! have_postgresql; then
-    apt_install "PostgreSQL is missing" postgresql
-    have_postgresql || die "PostgreSQL was installed, but there is no initdb in the PATH or /usr/lib/postgresql."
-fi
-if ! have_zink; then
-    apt_install "zink has no Vulkan driver" mesa-vulkan-drivers libvulkan1
-    have_zink || say "zink still makes no OpenGL context: tests/integration/test_zink.py will fail."
-fi
-if ! command -v glslangValidator >/dev/null; then
-    apt_install "the reference compiler of GLSL is missing" glslang-tools
-fi
-if ! command -v chromium >/dev/null && ! command -v google-chrome >/dev/null; then
-    apt_install "the browser of the dashboard's tests is missing" chromium
-fi
-if [ -z "$(find /usr/share/fonts /usr/local/share/fonts -name DejaVuSans.ttf -print -quit 2>/dev/null)" ]; then
-    apt_install "the font that the dashboard's pages fall back to is missing" fonts-dejavu-core
-fi
-if ! command -v cc >/dev/null || ! command -v g++ >/dev/null; then
-    apt_install "a C and a C++ compiler are missing" gcc g++
-fi
-if ! command -v Xvfb >/dev/null || ! command -v xdotool >/dev/null; then
-    apt_install "the display of the viewer's tests is missing" xvfb xdotool
-fi
+have_font() {
+    [ -n "$(find /usr/share/fonts /usr/local/share/fonts -name DejaVuSans.ttf -print -quit 2>/dev/null)" ]
+}
+
+# All at once: each installation reads the lists of all packages first.
+missing=() why=''
+needs() { # what is missing, packages...
+    why+="${why:+, }$1"
+    missing+=("${@:2}")
+}
+
+have() { command -v "$1" >/dev/null; }
+
+have_postgresql || needs "PostgreSQL" postgresql
+have_zink || needs "a Vulkan driver for zink" mesa-vulkan-drivers libvulkan1
+have glslangValidator || needs "the reference compiler of GLSL" glslang-tools
+have chromium || have google-chrome || needs "the browser of the dashboard's tests" chromium
+have_font || needs "the font that the dashboard's pages fall back to" fonts-dejavu-core
+{ have cc && have g++; } || needs "a C and a C++ compiler" gcc g++
+{ have Xvfb && have xdotool; } || needs "the display of the viewer's tests" xvfb xdotool
+[ "${#missing[@]}" -eq 0 ] && exit 0
+
+apt_install "tests miss $why" "${missing[@]}"
+have_postgresql || die "PostgreSQL was installed, but there is no initdb in the PATH or /usr/lib/postgresql."
+have_zink || say "zink still makes no OpenGL context: tests/integration/test_zink.py will fail."

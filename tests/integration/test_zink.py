@@ -18,10 +18,13 @@ from support.drivers import ROOT, environment, facts, lavapipe_installed
 from services.stress.gl_drivers import LLVMPIPE, ZINK
 
 ONE_PASS = "tests/differential/test_chain_one_pass.py"
+# Of the stress test's own judgement, and of a benchmark; the stress test itself runs on every driver.
+NOT_OF_DRIVERS = {"test_stress_gl_passes.py", "test_bench.py"}
 TECHNIQUES = sorted(
     path.relative_to(ROOT).as_posix()
     for path in (ROOT / "tests" / "differential").glob("test_*.py")
-    if re.search(r"^from renderer\.(techniques|allocation\.gpu)", path.read_text(encoding="utf-8"), re.MULTILINE)
+    if path.name not in NOT_OF_DRIVERS
+    and re.search(r"^from renderer\.(techniques|allocation\.gpu)", path.read_text(encoding="utf-8"), re.MULTILINE)
 )
 
 pytestmark = pytest.mark.skipif(
