@@ -35,6 +35,7 @@ from renderer.programs import Defines
 from renderer.techniques.base import Budget, Rendered
 from renderer.techniques.chain import Memory
 from renderer.techniques.kbuffer_deep import Inference, KBufferDeep
+from renderer.techniques.skips import PREDICTOR
 from schemas.problem import ExitCode, Problem
 from schemas.view import View
 
@@ -134,13 +135,16 @@ class KBufferTemporal(KBufferDeep):
                 "Use kbuffer-deep, or a bundle with gain curves and --inference glsl.",
                 ExitCode.LIMIT,
             )
-        past = self._past
+        past, self._past = self._past, None
         if past is None or not past.serves(frame, budget):
             memory = frame.buffer(MEMORY_BYTES // 4 * frame.pixels, 0)
             past = _Past(weakref.ref(frame.gpu), (frame.width, frame.height), budget, frame.view, memory)
-        self._still, self._memory = past.view == frame.view, Memory(past.memory, DEFINES)
-        self._past = replace(past, view=frame.view)
+        self._still = past.view == frame.view.model_copy(update={"name": past.view.name})
+        self._memory = Memory(past.memory, DEFINES)
         rendered = super().render(frame, budget)
+        # A frame that failed, or has slots for all, has noted nothing: the memory would be that of an earlier one.
+        if not rendered.skips.get(PREDICTOR):
+            self._past = replace(past, view=frame.view)
         return replace(
             rendered,
             pixel_bytes=rendered.pixel_bytes + MEMORY_BYTES,

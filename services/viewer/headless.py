@@ -42,6 +42,8 @@ def frames(
         with progress.stage("render frames", count) as stage:
             for number in range(count):
                 session.show(orbit(start, place.up, place.bounds, number, count))
+                while session.go_on():
+                    pass
                 made = session.rows(number)
                 with replacing(out / f"frame-{number:04}.png") as path:
                     write_png(path, session.screen())

@@ -86,7 +86,7 @@ def _session(options: ViewerOptions, scene: Opened, source: Source) -> Session:
         perceptual=options.perceptual,
         readout=options.readout,
     )
-    return Session(studio, look, scene.scene.file.stem, source.name)
+    return Session(studio, look, scene.scene.file.stem, source.name, None if asked.tail else trained)
 
 
 def _place(scene: Opened, source: Source) -> Place:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.techniques import TECHNIQUES
+from schemas.bundle import TailSpec
 from schemas.problem import Problem
 from schemas.view import View
 from services.report.colours import COUNT, HEAT
@@ -39,6 +40,7 @@ class Session:
         look: What is shown.
         name: Of the scene.
         bundle: Name of the bundle that is read; empty: none.
+        trained: The tail that the bundle was trained for; None: another one was asked for, or there is no bundle.
         message: What was done last; empty: nothing to say.
         is_computing: Whether what is shown is being compared with the exact picture.
     """
@@ -47,6 +49,7 @@ class Session:
     look: Look
     name: str
     bundle: str
+    trained: TailSpec | None = None
     message: str = ""
     is_computing: bool = False
     _asked: tuple[Shot, bool] | None = None
@@ -78,6 +81,23 @@ class Session:
         if self.message:
             notes.append(Note(textwrap.wrap(self.message, _WRAP), "bottom-right", 0, width))
         return draw(self.image(), notes)
+
+    def load(self, bundle: Path, name: str) -> None:
+        """Take another bundle, and its tail where that of the last one is shown.
+
+        Raises:
+            Problem: It is damaged or not understood.
+        """
+        trained = self.studio.load(bundle)
+        self.bundle, self.message = name, f"Now {name}."
+        if trained and self.trained:
+            if self.look.tail == self.trained.name:
+                self.look = replace(self.look, tail=trained.name)
+            self.trained, self.studio.g = trained, trained.g
+
+    def go_on(self) -> bool:
+        """Render the next frame of what learns from frame to frame, while the camera rests; whether any does still."""
+        return any(self.studio.go_on(shot) for shot in self.sides().values() if isinstance(shot, Shot))
 
     def ask(self, comparer: Comparer) -> bool:
         """Have what is shown compared with the exact picture, one picture after the other.

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from renderer.frame import RGB, Frame
 from renderer.gpu_scene import GpuScene
-from renderer.techniques import TECHNIQUES, Budget, Needs, Rendered, Technique, technique
+from renderer.techniques import TECHNIQUES, Budget, KBufferDeep, Needs, Rendered, Technique, technique
 from renderer.timing import Recording
+from schemas.bundle import TailSpec
 from schemas.colour import display8
 from schemas.problem import Problem
 from schemas.tail import TailName
@@ -59,12 +60,14 @@ class Shot:
         budget: F, and the tail.
         rendered: The picture.
         recording: Its times.
+        number: Of the frame, among those that its technique rendered in a row for this wish.
     """
 
     wish: Wish
     budget: Budget
     rendered: Rendered
     recording: Recording
+    number: int = 1
 
     def pane(self) -> Pane:
         """As it is shown."""
@@ -87,38 +90,44 @@ class Studio:
 
     Attributes:
         edition: Counts the bundles that were loaded: with another one, pictures are others.
+        g: Steepness of the density tail.
     """
 
     def __init__(self, gpu: GpuScene, needs: Needs, background: RGB, g: float) -> None:
-        self.gpu, self.edition = gpu, 0
-        self._background, self._g = background, g
+        self.gpu, self.edition, self.g = gpu, 0, g
+        self._background = background
         self._needs = replace(needs, allocate=self._optimal)
         self._techniques: dict[str, Technique] = {}
         self._subject: Subject | None = None
         self._made: dict[Wish, Shot | Problem] = {}
+        self._last: dict[str, tuple[Wish, int]] = {}
         self._compared: dict[tuple[Wish, bool], Compared | Problem] = {}
 
-    def load(self, bundle: Path) -> None:
-        """Take another bundle for what reads one."""
+    def load(self, bundle: Path) -> TailSpec | None:
+        """Take another bundle for what reads one; the tail that it was trained for."""
         readers = [name for name, entry in TECHNIQUES.items() if entry.needs_bundle]
         made = {name: technique(name, replace(self._needs, bundle=bundle)) for name in readers}
         self._needs = replace(self._needs, bundle=bundle)
         self._techniques = {**self._techniques, **made}
         self._made = {wish: shot for wish, shot in self._made.items() if wish.technique not in readers}
+        self._last = {}
         self._compared = {key: found for key, found in self._compared.items() if key[0] in self._made}
         self.edition += 1
+        return next((each.manifest.tail for each in made.values() if isinstance(each, KBufferDeep)), None)
 
     def shot(self, wish: Wish) -> Shot | Problem:
         """A picture, or why there is none; made if it is not there yet."""
         if wish not in self._made:
-            subject = self.subject(wish)
-            if len(self._made) >= _KEPT:
-                self._made.pop(next(iter(self._made)))
-            try:
-                self._made[wish] = self._shoot(subject, wish)
-            except Problem as problem:
-                self._made[wish] = problem
+            self._make(wish)
         return self._made[wish]
+
+    def go_on(self, shot: Shot) -> bool:
+        """Render the next frame of a picture, until its technique has settled; whether there was one to render."""
+        if shot.number >= TECHNIQUES[shot.wish.technique].settles:
+            return False
+        self._compared = {key: found for key, found in self._compared.items() if key[0] != shot.wish}
+        self._make(shot.wish)
+        return True
 
     def subject(self, wish: Wish) -> Subject:
         """The view of a picture; with another camera or size, what was made of the last one is forgotten."""
@@ -152,6 +161,15 @@ class Studio:
             self._compared[shot.wish, perceptual] = found
         return is_kept
 
+    def _make(self, wish: Wish) -> None:
+        subject = self.subject(wish)
+        if wish not in self._made and len(self._made) >= _KEPT:
+            self._made.pop(next(iter(self._made)))
+        try:
+            self._made[wish] = self._shoot(subject, wish)
+        except Problem as problem:
+            self._made[wish] = problem
+
     def _shoot(self, subject: Subject, wish: Wish) -> Shot:
         if wish.technique not in self._techniques:
             self._techniques[wish.technique] = made = technique(wish.technique, self._needs)
@@ -162,10 +180,13 @@ class Studio:
                 self._subject = subject
         budget = self._budget(wish, wish.size)
         rendered, recording = shoot(subject, self._techniques[wish.technique], budget)
-        return Shot(wish, budget, rendered, recording)
+        last, number = self._last.get(wish.technique, (None, 0))
+        number = number + 1 if last == wish else 1
+        self._last[wish.technique] = wish, number
+        return Shot(wish, budget, rendered, recording, number)
 
     def _budget(self, wish: Wish, size: tuple[int, int]) -> Budget:
-        return Budget(max(1, int(wish.factor * size[0] * size[1])), wish.tail, self._g)
+        return Budget(max(1, int(wish.factor * size[0] * size[1])), wish.tail, self.g)
 
     def _optimal(self, frame: Frame, budget: Budget) -> NDArray[np.int32]:
         """What `kbuffer-optimal` renders of the view under way."""

@@ -1,7 +1,7 @@
 """The window: shows what a session composes, and turns keys and mouse into another look.
 
-Nothing is rendered while nothing changes. When the camera rests, what is shown is compared with the exact picture, in a
-process of its own: the window goes on meanwhile.
+Nothing is rendered while nothing changes. When the camera rests, what learns from frame to frame goes on until it has
+settled; then what is shown is compared with the exact picture, in a process of its own: the window goes on meanwhile.
 """
 
 from __future__ import annotations
@@ -219,10 +219,12 @@ class Viewer:
         self.session.look = zoom(self.session.look, self._place, _ZOOM**dy)
 
     def _compare(self) -> bool:
-        """Have what is shown compared while nothing changes; whether there is something new to say of it."""
+        """Have what is shown settle and be compared while nothing changes; whether there is anything new of it."""
         session, before = self.session, self.session.is_computing
         has_come = session.take(self._comparer)
         if not self._is_led and time.monotonic() - self._changed > REST:
+            if session.go_on():
+                return True
             session.is_computing = session.ask(self._comparer)
         return has_come or session.is_computing != before
 
@@ -232,12 +234,9 @@ class Viewer:
         if newer is None:
             return
         try:
-            self.session.studio.load(newer)
+            self.session.load(newer, fetched_name(self._source.name, newer))
         except Problem as problem:
             self.session.message = f"{problem.title} {problem.remedy}"
-            return
-        self.session.bundle = fetched_name(self._source.name, newer)
-        self.session.message = f"Now {self.session.bundle}."
 
     def _fit(self) -> None:
         """Pictures are as large as there is room for, but for those that are too slow to lead the camera by."""

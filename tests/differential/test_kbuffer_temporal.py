@@ -20,7 +20,7 @@ from renderer.gpu_scene import GpuScene
 from renderer.reference import temporal as twin
 from renderer.techniques import Budget, KBufferDeep, KBufferTemporal
 from renderer.techniques.chain import one_pass_available
-from renderer.techniques.kbuffer_temporal import FRAMES, MEMORY_BYTES, SETTLED
+from renderer.techniques.kbuffer_temporal import FRAMES, MEMORY_BYTES, MOVING_FRAMES, SETTLED, is_cut
 from schemas.bundle import load_manifest
 from schemas.fragments import FragmentDump
 from schemas.problem import ExitCode, Problem
@@ -30,6 +30,7 @@ from services.bench.measure import over
 from services.bench.subject import Subject
 from services.stress.gl_network import random_networks
 from services.stress.predictors import networks, real_features
+from services.versions import machine
 
 SMALL = (64, 48)
 """Where many frames are rendered."""
@@ -172,12 +173,56 @@ def test_it_begins_anew_with_whatever_is_another(gpu: GpuScene, bundle: Path, gl
         assert not np.array_equal(new, again), what
 
 
-def test_all_fragments_are_the_exact_picture(gpu: GpuScene, bundle: Path, dump: FragmentDump) -> None:
-    temporal, deep, budget = KBufferTemporal(bundle), KBufferDeep(bundle), Budget(dump.total + 1)
-    for _ in range(2):
-        rendered = temporal.render(Frame(gpu, VIEW, *SIZE), budget)
-        assert np.array_equal(rendered.linear, deep.render(Frame(gpu, VIEW, *SIZE), budget).linear)
-        assert not memory_of(temporal).is_open.any()
+@pytest.mark.parametrize("counted", [False, True])
+def test_after_a_frame_with_all_its_fragments_it_begins_anew(gpu: GpuScene, bundle: Path, counted: bool) -> None:
+    # A step back from a view in which the budget holds all fragments.
+    near, far = VIEW, VIEW.model_copy(update={"eye": tuple(1.02 * x for x in VIEW.eye)})
+    low, high = gpu.scene.bounds
+    assert not is_cut(near, far, float(np.linalg.norm(high - low)))
+    budget = Budget(int(Frame(gpu, far, *SMALL).count().sum()))
+    assert budget.fragments < Frame(gpu, near, *SMALL).count().sum()
+    temporal, deep = KBufferTemporal(bundle), KBufferDeep(bundle)
+    plain = deep.render(Frame(gpu, near, *SMALL), budget)
+    for view in (near, near, far, near):
+        frame = Frame(gpu, view, *SMALL)
+        if counted:
+            frame.count()
+        rendered = temporal.render(frame, budget)
+        assert rendered.captured == budget.fragments
+        if view is far:
+            assert np.array_equal(rendered.linear, deep.render(Frame(gpu, view, *SMALL), budget).linear)
+    assert np.array_equal(rendered.linear, plain.linear)
+
+
+def test_a_frame_that_fails_leaves_nothing_behind(gpu: GpuScene, bundle: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    temporal, budget = KBufferTemporal(bundle), Budget(SMALL[0] * SMALL[1])
+    first = temporal.render(Frame(gpu, VIEW, *SMALL), budget)
+    with monkeypatch.context() as patch:
+        patch.setattr(KBufferDeep, "_curves", lambda *_: (_ for _ in ()).throw(Problem("Full.", "Smaller.")))
+        with pytest.raises(Problem):
+            temporal.render(Frame(gpu, turned(1), *SMALL), budget)
+    assert np.array_equal(temporal.render(Frame(gpu, VIEW, *SMALL), budget).linear, first.linear)
+
+
+def test_a_camera_by_another_name_stands_still(gpu: GpuScene, bundle: Path) -> None:
+    temporal, budget = KBufferTemporal(bundle), Budget(SMALL[0] * SMALL[1])
+    for number in range(MOVING_FRAMES + 3):
+        view = VIEW.model_copy(update={"name": f"frame {number}"})
+        temporal.render(Frame(gpu, view, *SMALL), budget)
+    assert memory_of(temporal).frames.max() > MOVING_FRAMES
+
+
+@pytest.mark.parametrize(("size", "away"), [((1, 1), False), ((3, 2), False), ((8, 8), True)])
+def test_small_and_empty_pictures(gpu: GpuScene, bundle: Path, size: tuple[int, int], away: bool) -> None:
+    view = VIEW.model_copy(update={"target": (VIEW.eye[0], VIEW.eye[1], 2.0 * VIEW.eye[2])}) if away else VIEW
+    n = Frame(gpu, view, *size).count()
+    assert n.any() != away
+    for fragments in {0, 1, max(int(n.sum()) - 1, 0), int(n.sum())}:
+        temporal = KBufferTemporal(bundle)
+        for _ in range(2):
+            rendered = temporal.render(Frame(gpu, view, *size), Budget(fragments))
+            assert rendered.captured == min(fragments, n.sum())
+            assert np.isfinite(rendered.linear).all()
 
 
 def test_curves_that_are_no_numbers_stay_within_the_budget(
@@ -220,5 +265,5 @@ def test_the_benchmark_measures_the_frames_that_it_names(gpu: GpuScene, bundle: 
         moving = found["moving"][str(step)]
         assert min(moving["error"], moving["flicker"], *moving["k"]) > 0.0
     rows = [{"scene": "shells", "budget_factor": 0.5, **found}]
-    table = page({"command": "c", "machine": {}, "bundle": "b", "created": "now", "rows": rows})
+    table = page({"command": "c", "machine": machine(), "bundle": "b", "created": "now", "rows": rows})
     assert f"| shells | 0.5 | {found['still']['1']:.2f} |" in table

@@ -26,9 +26,9 @@ from trainer.weights import Weights
 
 ROOT = Path(__file__).resolve().parents[2]
 CLIENT = ROOT / "deploy" / "client" / "c"
-WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror")
+WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
 SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g")
-STANDARDS = {"cc": ("-std=c99",), "g++": ("-x", "c++", "-std=c++17")}
+STANDARDS = {"cc": ("-std=c99",), "g++": ("-x", "c++", "-std=c++11")}
 
 pytestmark = pytest.mark.skipif(
     any(shutil.which(name) is None for name in STANDARDS), reason="there is no C compiler: apt-get install gcc g++"

@@ -21,8 +21,11 @@ from diaphane_client import server as client_server
 from renderer.samples import SAMPLES
 from renderer.scene import LoadOptions
 from renderer.techniques import Budget, Needs, technique
+from schemas.bench import CellKey
+from schemas.bundle import load_manifest
 from schemas.problem import ExitCode
 from schemas.tail import DEFAULT_TAIL
+from services.bench.rounds import Run
 from services.bench.subject import Subject
 from services.cli.app import run
 from services.local_scenes import LocalScene
@@ -31,6 +34,7 @@ from services.stages.pictures import write_png
 from services.viewer import model
 from services.viewer.camera import orbit
 from services.viewer.model import Service, remote_source
+from services.viewer.studio import Studio
 
 SIZE = (64, 48)
 
@@ -123,6 +127,22 @@ def test_statistics_are_those_of_the_bench(scene: Path, folder: Path, capsys: py
     ]
 
 
+def test_what_learns_from_frame_to_frame_is_shown_as_the_bench_measures_it(
+    scene: Path, bundles: list[Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    pair = ("kbuffer-temporal", "kbuffer-deep")
+    options = ["--bundle", str(bundles[0]), "-t", pair[0], "--against", pair[1], "--budget", "0.5", "--size", "80x60"]
+    found = rows(capsys, scene, *options)
+    local = LocalScene(scene, scene, LoadOptions())
+    local.at(None)
+    subject = Subject(local.gpu(), local.views(None, None)[0].view, (80, 60))
+    for row in found:
+        made = technique(row["technique"], Needs(bundle=bundles[0]))
+        cell = Run(CellKey(technique=made.name, basis="none"), made, Budget(2400, row["tail"], row["g"]))
+        assert row["mse_display"] == subject.errors(cell.first(subject, 60.0)).mse_display
+    assert found[0]["mse_display"] != found[1]["mse_display"]
+
+
 def test_the_first_frame_is_the_picture_that_render_makes(
     scene: Path, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -206,7 +226,7 @@ def test_a_model_that_cannot_be_had_is_a_problem(
 
 
 def test_later_versions_of_the_alias_come_by_themselves(
-    bundles: list[Path], server: ReleaseServer, folder: Path, monkeypatch: pytest.MonkeyPatch
+    scene: Path, bundles: list[Path], server: ReleaseServer, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(model, "_EVERY", 0.02)
     publish(server, bundles[0], "1.0.0")
@@ -218,6 +238,9 @@ def test_later_versions_of_the_alias_come_by_themselves(
         newer = source.later.get(timeout=30.0)
         assert newer.name == "1.1.0"
         assert source.newest() is None
+    local = LocalScene(scene, scene, LoadOptions())
+    local.at(None)
+    assert Studio(local.gpu(), Needs(), (1.0, 1.0, 1.0), 0.5).load(newer) == load_manifest(bundles[1]).tail
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A bundle in C: its manifest and weights, the network in float32, and the slots of every pixel, on the CPU.
- * C99 or C++17, the standard library and nothing else. docs/CLIENTS.md says where each function stands in a frame.
+ * C99 or C++11, the standard library and nothing else. docs/CLIENTS.md says where each function stands in a frame.
  *
  *     #define DIAPHANE_BUNDLE_IMPLEMENTATION   // in one source file; link the mathematics library (-lm)
  *     #include "diaphane_bundle.h"
@@ -945,19 +945,20 @@ int diaphane_self_test(const DiaphaneBundle *bundle, DiaphaneError *error) {
         for (i = 0; i < inputs; ++i) x[i] = (float)bundle->test_features[row * inputs + i];
         if (!diaphane_predict(bundle, x, y)) return dia__fail(error, "row %d has no finite answer", (int)row);
         for (i = 0; i < outputs; ++i) {
-            double expected = bundle->test_outputs[row * outputs + i], difference = fabs(y[i] - expected);
+            double expected = bundle->test_outputs[row * outputs + i], difference = fabs((double)y[i] - expected);
             if (!(difference <= bundle->test_tolerance * bundle->test_scale[i]))
-                return dia__fail(error, "row %d, output %d: %.9g instead of %.9g", (int)row, (int)i, y[i], expected);
+                return dia__fail(error, "row %d, output %d: %.9g instead of %.9g", (int)row, (int)i,
+                                 (double)y[i], expected);
         }
     }
     for (row = 0; row < bundle->test_pixels; ++row) {
         for (i = 0; i < DIAPHANE_SUMS; ++i) sums[i] = (float)bundle->test_sums[row * DIAPHANE_SUMS + i];
         diaphane_features(bundle, sums, x);
         for (i = 0; i < inputs; ++i) {
-            double expected = bundle->test_derived[row * inputs + i], difference = fabs(x[i] - expected);
+            double expected = bundle->test_derived[row * inputs + i], difference = fabs((double)x[i] - expected);
             if (!(difference <= bundle->test_feature_tolerance * (fabs(expected) > 1.0 ? fabs(expected) : 1.0)))
                 return dia__fail(error, "pixel %d, %s: %.9g instead of %.9g", (int)row,
-                                 dia__features[bundle->feature[i]], x[i], expected);
+                                 dia__features[bundle->feature[i]], (double)x[i], expected);
         }
     }
     return 1;
@@ -986,7 +987,7 @@ static uint32_t dia__fragments(const dia__curve *curve, float t, uint32_t k_min)
 }
 
 static int dia__read_curve(dia__curve *curve, float a, float b, uint32_t n) {
-    const float most_gain = 0x1p100f, least_rate = 0x1p-98f, most_rate = 0x1p12f;
+    const float most_gain = 1.2676506002282294e30f, least_rate = 3.1554436208840472e-30f, most_rate = 4096.0f;
     float rate = 1.0f / b;
     if (!dia__finite(a) || !dia__finite(b) || !(b > 0.0f)) return 0;
     curve->a = a < -most_gain ? -most_gain : a > most_gain ? most_gain : a;

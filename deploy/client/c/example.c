@@ -24,7 +24,7 @@ static int spend(const DiaphaneBundle *bundle) {
         fprintf(stderr, "%s\n", error.text);
         return 0;
     }
-    printf("budget 9: slots %u %u %u %u, log lambda %.6g\n", k[0], k[1], k[2], k[3], found.log_lambda);
+    printf("budget 9: slots %u %u %u %u, log lambda %.6g\n", k[0], k[1], k[2], k[3], (double)found.log_lambda);
     return 1;
 }
 
@@ -43,7 +43,10 @@ int main(int argc, char **argv) {
     }
     printf("%s: tail %s, metric %s, %d files\n", bundle.name, bundle.tail, bundle.metric, bundle.files);
     printf("reads:");
-    for (int i = 0; i < bundle.features; ++i) printf(" %s", diaphane_feature_name(bundle.feature[i]));
+    for (int i = 0; i < bundle.features; ++i) {
+        const char *name = diaphane_feature_name(bundle.feature[i]);
+        printf(" %s", name ? name : "?");
+    }
     printf("\nunits:");
     for (int i = 0; i <= bundle.layers; ++i) printf(" %d", (int)bundle.units[i]);
     printf("\nanswers:");

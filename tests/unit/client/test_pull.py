@@ -137,6 +137,16 @@ def _path_for_a_name(record: Record) -> Record:
     return record_of(record["version"], {**files, "../../evil": FileRef(sha256="0" * 64, bytes=3)})
 
 
+def _path_for_a_version(record: Record) -> Record:
+    files = {name: FileRef(**file) for name, file in record["files"].items()}
+    return record_of("../../../published-1.0.0-0", files)
+
+
+def _no_version(record: Record) -> Record:
+    files = {name: FileRef(**file) for name, file in record["files"].items()}
+    return record_of("", files)
+
+
 def _without_manifest(record: Record) -> Record:
     files = {name: FileRef(**file) for name, file in record["files"].items() if name != MANIFEST}
     return record_of(record["version"], files)
@@ -164,6 +174,8 @@ TAMPERED: list[Callable[[Record], Record]] = [
     _other_digest_signed,
     _other_name,
     _path_for_a_name,
+    _path_for_a_version,
+    _no_version,
     _without_manifest,
     _too_large,
     _no_record,
@@ -179,7 +191,7 @@ def test_a_tampered_record_is_refused_and_the_old_bundle_stays(
     before = len(server.blob_requests())
     server.records["glass/versions/champion"] = json.dumps(tamper(publish(server, tmp_path, "1.1.0"))).encode()
     with pytest.raises(Refused):
-        fetch(server, tmp_path)
+        fetch(server, tmp_path, allow_rollback=True)
     assert len(server.blob_requests()) == before
     assert visible(tmp_path) == ["1.0.0"]
     assert cached("glass", url=server.url, folder=tmp_path / "bundles") == folder
@@ -210,6 +222,7 @@ INVALID: list[tuple[dict[str, Any], str]] = [
     ({"features": []}, "no features"),
     ({"features": [{"name": "count", "mean": 0.0, "std": 0.0}]}, "no spread"),
     ({"features": [{"name": "count", "mean": float("nan"), "std": 1.0}]}, "not finite"),
+    ({"features": [{"name": "count", "mean": 10**400, "std": 1.0}]}, "too large"),
     ({"outputs": ["a"]}, "does not answer a"),
     ({"head": "other"}, "head 'other'"),
     ({"self_test": None, "tail": None}, "another type"),
@@ -261,9 +274,17 @@ def test_the_same_version_with_other_files_is_refused(server: ReleaseServer, tmp
     publish(server, tmp_path, "1.0.0")
     fetch(server, tmp_path)
     bundle = make_bundle(tmp_path / "other", "other")
-    serve(server, record_of("1.0.0", bundle_files(bundle)))
+    files = bundle_files(bundle)
+    serve(server, record_of("1.0.0", files))
     with pytest.raises(Refused, match="Versions never change"):
         fetch(server, tmp_path)
+    server.blobs |= {files[name].sha256: (bundle / name).read_bytes() for name in files}
+    serve(server, record_of("1.0.0", files), alias="candidate")
+    with pytest.raises(Refused, match="a folder of its own"):
+        fetch(server, tmp_path, "candidate")
+    other = pull("glass", "candidate", url=server.url, key=KEY, folder=tmp_path / "others")
+    assert visible(tmp_path) == ["1.0.0"]
+    assert (other / MANIFEST).read_bytes() == (bundle / MANIFEST).read_bytes()
 
 
 def test_a_version_that_was_asked_for_is_that_version(server: ReleaseServer, tmp_path: Path) -> None:
@@ -378,8 +399,10 @@ def test_refusals_of_the_server_say_what_to_do(server: ReleaseServer, tmp_path: 
     publish(server, tmp_path, "1.0.0")
     with pytest.raises(NotFound, match="diaphane models list"):
         fetch(server, tmp_path, "candidate")
-    with pytest.raises(Denied, match="scope `read`"):
-        pull("glass", url=server.url, key=None, folder=tmp_path / "bundles")
+    for key, said in ((None, "scope `read`"), ("dia_\u00e4", "one word"), ("dia_x\nHost: x", "one word")):
+        with pytest.raises(Denied, match=said):
+            pull("glass", url=server.url, key=key, folder=tmp_path / "bundles")
+    assert pull("glass", url=server.url, key=f"{KEY}\n", folder=tmp_path / "bundles").name == "1.0.0"
     for status in (301, 418):
         server.status = status
         with pytest.raises(Refused, match=f"status {status}"):

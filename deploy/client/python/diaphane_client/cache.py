@@ -94,6 +94,18 @@ class Cache:
             return None
         return folder if intact else None
 
+    def is_taken(self, release: Release) -> bool:
+        """Whether an alias means a whole bundle of the same version with other files, such as another server's."""
+        trusted = [key for key in self._known_keys().values() if isinstance(key, str)]
+        found = (self.pointer(path.stem, trusted) for path in (self._folder / "aliases").glob("*.json"))
+        return any(
+            pointer.release.version == release.version
+            and pointer.release.digest != release.digest
+            and self.bundle(pointer.release)
+            for pointer in found
+            if pointer
+        )
+
     def keep(self, release: Release) -> Path:
         """Makes a bundle of complete, verified parts, in one step; replaces one that is damaged.
 

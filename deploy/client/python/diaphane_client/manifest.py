@@ -109,7 +109,7 @@ def parse_manifest(content: bytes) -> Manifest:
     """
     try:
         return _parsed(json.loads(content))
-    except (KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (KeyError, TypeError, AttributeError, RecursionError, OverflowError) as error:
         raise ValueError(f"a member is missing or of another type ({error})") from error
 
 

@@ -134,6 +134,11 @@ def cached(
 
 
 def _fetch(server: Server, cache: Cache, release: Release) -> Path:
+    if cache.is_taken(release):
+        raise Refused(
+            f"Another '{release.name}' {release.version} is in the folder, with other files.",
+            "Versions never change: give this server a folder of its own, or ask who runs it.",
+        )
     # The manifest first: it is small, and tells whether the rest is worth downloading.
     for name, file in sorted(release.files.items(), key=lambda item: item[0] != MANIFEST):
         server.download(file, cache.part(file.sha256))

@@ -3,7 +3,7 @@
 Rules:
 - the statement is the exact text that is signed; what the record says beside it must be the same;
 - the digest follows from the names and hashes of the files;
-- names of files are plain, so that none leads out of the bundle's folder.
+- names of files are plain and versions are numbers, so that none leads out of its folder.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from diaphane_client.manifest import MANIFEST, FileRef, parse_files, parse_manif
 STATEMENT_FORMAT: Final = "diaphane-release/1"
 MAX_RECORD_BYTES: Final = 1 << 20
 
-_VERSION = re.compile(r"(\d{1,6})\.(\d{1,6})\.(\d{1,6})")
+_VERSION = re.compile(r"\.".join(3 * [r"(0|[1-9][0-9]{0,5})"]))
 
 _SERVED_WRONG = "Ask who runs the server: it may be misconfigured, or somebody may have tampered with it."
 
@@ -79,8 +79,8 @@ def parse(content: bytes) -> Release:
         if not all(isinstance(text, str) for text in texts.values()):
             raise TypeError("a text is not one")
         release = Release(**texts, files=parse_files(record["files"]))
-        if MANIFEST not in release.files:
-            raise ValueError("there is no manifest")
+        if MANIFEST not in release.files or not release.order:
+            raise ValueError("there is no manifest, or no version")
         return release
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise Refused(
@@ -103,7 +103,8 @@ def verify(release: Release, name: str, selector: str, trusted: Collection[str])
     if release.public_key not in trusted:
         raise Refused(
             f"'{name}' is signed with the key {release.public_key}, which is not the one that is trusted here.",
-            "If the server's key was changed on purpose, give the new one as public_key once.",
+            "If the server's key was changed on purpose, give the new one as public_key once, or take the server from "
+            "known-keys.json in the folder of bundles.",
         )
     if not _is_signed(release):
         raise Refused(f"The signature of '{name}' {release.version} is wrong.", _SERVED_WRONG)

@@ -34,7 +34,9 @@ class Server:
 
     def __init__(self, url: str, key: str | None, timeout: float) -> None:
         headers = {"Accept-Encoding": "identity"}
-        if key:
+        if key := (key or "").strip():  # files of keys end with a line feed
+            if not (key.isascii() and key.isprintable()):
+                raise Denied("The key is not one.", "A key is one word: dia_...")
             headers["Authorization"] = f"Bearer {key}"
         # Redirects are not followed: the key is for this server only.
         self._http = httpx.Client(

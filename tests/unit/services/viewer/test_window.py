@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 from collections.abc import Hashable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,11 +15,15 @@ import pytest
 from support.scenes import VIEW, shells
 
 from renderer import context
+from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
-from renderer.techniques import Budget, KBuffer, Needs, Rendered, SBuffer, Technique
+from renderer.techniques import Budget, KBuffer, KBufferTemporal, Needs, Rendered, SBuffer, Technique
+from renderer.techniques.kbuffer_temporal import SETTLED
 from renderer.timing import Recording
+from schemas.bundle import TailSpec
 from schemas.fragments import FragmentDump
 from schemas.problem import Problem
+from schemas.tail import TailName
 from services.bench.exact import Exact
 from services.bench.rounds import shoot
 from services.bench.subject import Subject
@@ -167,6 +172,40 @@ def test_nothing_is_rendered_while_nothing_changes(viewer: Viewer, monkeypatch: 
     press(viewer, "A")
     viewer.step()
     assert viewer.session.sides()["left"] is shots["left"]  # going back renders nothing
+
+
+def test_what_learns_from_frame_to_frame_settles_before_it_is_compared(
+    gpu: GpuScene, ctx: moderngl.Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    budgets = []
+
+    class Learning(KBuffer):
+        def render(self, frame: Frame, budget: Budget) -> Rendered:
+            budgets.append(budget)
+            return super().render(frame, budget)
+
+    now = [100.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr("services.viewer.studio.technique", lambda *_: Learning())
+    viewer = make(gpu, ctx, tmp_path, tmp_path)
+    viewer.session.look = replace(viewer.session.look, left=KBufferTemporal.name, layout="single")
+    viewer.step()
+    budgets.clear()
+    now[0] += module.REST + 0.1
+    for number in range(2, 5):
+        assert viewer.step()
+        assert len(budgets) == number - 1
+    press(viewer, "B")
+    viewer.step()
+    press(viewer, "V")
+    viewer.step()
+    assert len(budgets) == 4, "it is the picture of before, which begins anew when the camera rests"
+    now[0] += module.REST + 0.1
+    budgets.clear()
+    while known(viewer, "left") is None:
+        assert viewer.step()
+    assert len(budgets) == SETTLED
+    assert len(set(budgets)) == 1
 
 
 def test_while_it_is_compared_the_window_goes_on_and_shows_no_answer_to_what_it_left(
@@ -387,6 +426,26 @@ def test_a_new_bundle_is_taken_while_the_window_is_open(
     assert viewer.session.sides()["left"] is after["left"]
     assert viewer.session.message == "The bundle is damaged. Fetch it again."
     assert viewer.session.bundle == "glass@1.1.0"
+
+
+def test_a_new_bundle_brings_its_tail_unless_another_one_was_chosen(
+    viewer: Viewer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session, tails = viewer.session, [TailSpec(name="density", g=0.5), TailSpec(name="density-8", g=0.25)]
+    monkeypatch.setattr(session.studio, "load", lambda _: tails.pop(0))
+    session.load(Path("1.1.0"), "glass@1.1.0")
+    assert session.look.tail == "density-16", "it was asked for"
+    session.trained, tails[:] = TailSpec(name="density-16", g=0.75), [tails[0], *tails, TailSpec(name="paper", g=0.0)]
+    cases: list[tuple[TailName, str]] = [
+        ("density-16", "density-8"),
+        ("exact-coverage", "exact-coverage"),
+        ("density-8", "paper"),
+    ]
+    for chosen, shown in cases:
+        session.look = replace(session.look, tail=chosen)
+        session.load(Path("1.2.0"), "glass@1.2.0")
+        assert session.look.tail == shown
+    assert session.studio.g == 0.0
 
 
 def test_a_process_has_one_context(gl: moderngl.Context, monkeypatch: pytest.MonkeyPatch) -> None:
