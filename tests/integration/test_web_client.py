@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -54,25 +56,22 @@ def frame(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Fra
 
 @pytest.fixture(scope="module")
 def bundles(frame: Frame, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A bundle for every tail, with the same network; that for the default tail is called `glass`."""
+    """A bundle for every tail, with the same network, that for the default tail `glass`; and one of importances."""
     first = tmp_path_factory.mktemp("bundle")
     provenance = Provenance(scenes={}, code_version="0", seed=0, machine="test")
     described = Description("glass", TailSpec(name=DEFAULT_TAIL, g=0.75), "display", 1, provenance, {})
     parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver="none")
     features = derive(gather(capture(frame).dump, bins=16))
     manifest = write_bundle(first, random_weights(11), described, features, lambda: parity)
-    made = {"glass": first}
+    made = {"glass": first, "importance": tmp_path_factory.mktemp("importance")}
+    importances = random_weights(11, head="importance", outputs=("importance",))
+    write_bundle(made["importance"], importances, replace(described, name="importance"), features, lambda: parity)
     for tail in OTHER_TAILS:
         made[tail] = tmp_path_factory.mktemp("bundles") / tail
         shutil.copytree(first, made[tail])
         other = manifest.model_copy(update={"name": tail, "tail": TailSpec(name=tail, g=G)})
         (made[tail] / MANIFEST).write_text(other.model_dump_json(), encoding="utf-8")
     return made
-
-
-@pytest.fixture(scope="module")
-def bundle(bundles: dict[str, Path]) -> Path:
-    return bundles["glass"]
 
 
 @pytest.fixture(scope="module")
@@ -166,21 +165,42 @@ def test_half_floats_do_where_float32_is_not_blended(webgpu: Any, api: Api, url:
     opened.context.close()
 
 
-def test_predicted_slots_use_the_budget_exactly(tab: Tab, frame: Frame, bundle: Path) -> None:
+@pytest.mark.parametrize(("model", "factors"), [("glass@champion", (0.1, 0.5, 4.0)), ("importance@1.0.0", (0.1, 0.5))])
+def test_predicted_slots_use_the_budget_exactly(
+    tab: Tab, frame: Frame, bundles: dict[str, Path], model: str, factors: tuple[float, ...]
+) -> None:
     """From less than a slot for every occupied pixel to more than there are fragments."""
-    deep = KBufferDeep(bundle)
-    for factor in (0.1, 0.5, 4.0):
+    _choose(tab, model)
+    deep = KBufferDeep(bundles[model.split("@")[0]])
+    for factor in factors:
         picture, k, total = _pictured(tab, frame, "kbuffer-deep", factor)
         expected = deep.render(frame, Budget(int(factor * PIXELS)))
         assert k.sum() == min(int(factor * PIXELS), total)
         assert np.mean(k == expected.k) > 0.98
         assert _shares(picture, expected.linear) >= 0.999
+    _choose(tab, "glass@champion")
     assert tab.faults == []
 
 
 def _choose(tab: Tab, model: str) -> None:
     tab.page.locator("#model").select_option(model)
     tab.page.locator("#model-note").get_by_text(f"{model.split('@')[0]} 1.0.0: ").wait_for()
+
+
+def test_the_last_model_draws_while_another_one_is_fetched(tab: Tab) -> None:
+    page = tab.page
+    held: list[Any] = []
+    page.route("**/demo/v1/blobs/**", lambda route: held.append(route))
+    page.locator("#model").select_option("importance@1.0.0")
+    page.get_by_label("Budget").fill("-1")
+    page.locator("#figures tr").nth(1).get_by_text(f"{PIXELS // 2:,}").wait_for()
+    assert len(held) == 1
+    assert page.get_by_role("alert").count() == 0
+    page.unroute("**/demo/v1/blobs/**")
+    page.locator("#model-note").get_by_text("importance 1.0.0: ").wait_for()
+    page.get_by_label("Budget").fill("-2")
+    _choose(tab, "glass@champion")
+    assert tab.faults == []
 
 
 @pytest.mark.parametrize("tail", OTHER_TAILS)
@@ -224,7 +244,25 @@ def test_the_keyboard_turns_and_splits(tab: Tab) -> None:
     page.wait_for_timeout(100)
     page.locator("#facts").filter(has_not_text=before).wait_for()
     page.keyboard.press("0")
+    # The split moves also while a picture is being drawn, which needs something read back.
+    page.evaluate(
+        """() => {
+            const { mapAsync } = GPUBuffer.prototype;
+            const released = new Promise((done) => (globalThis.release = done));
+            GPUBuffer.prototype.mapAsync = async function (...all) {
+                globalThis.isHeld = true;
+                await released;
+                return mapAsync.apply(this, all);
+            };
+        }"""
+    )
+    page.keyboard.press("ArrowLeft")
+    tab.until("!!globalThis.isHeld")
     page.keyboard.press("[")
+    shown = np.asarray(Image.open(io.BytesIO(page.locator("#canvas").screenshot())).convert("L"), dtype=int)
+    assert np.flatnonzero(np.abs(shown[3] - 128) <= 2).tolist() == [SIZE[0] // 2 - 1, SIZE[0] // 2]
+    page.evaluate("release()")
+    page.keyboard.press("0")
     assert tab.faults == []
 
 
@@ -237,6 +275,14 @@ def test_files_are_opened_or_refused_with_a_remedy(tab: Tab, tmp_path: Path) -> 
     page.get_by_label("A file of your own").set_input_files(HOME / "shelf.glb")
     page.get_by_role("alert").wait_for(state="hidden")
     assert page.get_by_label("Scene").locator("option").nth(0).inner_text() == "shelf.glb"
+    page.locator("#scene").select_option("glass shells")
+    page.locator("#status:empty").wait_for(state="attached")
+    page.locator("#scene").select_option(label="shelf.glb")
+    page.locator("#status:empty").wait_for(state="attached")
+    assert page.get_by_role("alert").count() == 0
+    with page.expect_file_chooser():
+        page.get_by_label("A file of your own").click()
+    assert page.get_by_label("A file of your own").input_value() == ""  # so that the same file is another choice
     assert tab.faults == []
 
 

@@ -1,9 +1,9 @@
 // Binary glTF to a scene: geometry, transforms, base colour and opacity, which is all that is rendered
 // (renderer/convert.py reads the same).
 
-import { type Document, type Material, type Primitive, WebIO, Logger } from "@gltf-transform/core";
+import { type Document, type Material, type Primitive, type Texture, WebIO, Logger } from "@gltf-transform/core";
 
-import { type Vec3, cofactors, cross, scaled, subtract, transformed, unit } from "./math";
+import { type Mat4, type Vec3, cofactors, cross, product, scaled, subtract, transformed, unit } from "./math";
 import { Trouble } from "./trouble";
 import { type Batch, type Image, type Layer, type Scene, encodeGamma2, orient } from "./scene";
 
@@ -11,6 +11,8 @@ const MOST_VERTICES = 4_000_000;
 const MOST_CORNERS = 6 * MOST_VERTICES;
 /** Of all accessors: those without data, or with the same, take no room in a file. */
 const MOST_ELEMENTS = 32_000_000;
+/** Of all images, decoded: 4 bytes each. */
+const MOST_TEXELS = 2 ** 28;
 const MOST_BYTES = 256 * 2 ** 20;
 const TRIANGLES = 4;
 const STRIP = 5;
@@ -51,21 +53,24 @@ interface Placed {
  * Reads a .glb file.
  *
  * @param name Short name of the scene.
+ * @param file Its content; nothing of it is read if it is too large.
  * @throws Trouble It is damaged, has nothing to draw, or needs what is not supported.
  */
-export async function readGlb(name: string, bytes: Uint8Array<ArrayBuffer>): Promise<Scene> {
-  if (bytes.byteLength > MOST_BYTES) {
+export async function readGlb(name: string, file: Blob): Promise<Scene> {
+  if (file.size > MOST_BYTES) {
     throw new Trouble(`${name} is larger than ${MOST_BYTES / 2 ** 20} MiB.`, "Open a smaller file.");
   }
+  const bytes = await file.arrayBuffer().catch(() => {
+    throw new Trouble(`${name} cannot be read.`, "It may be a folder, or have changed on the disk: choose it again.");
+  });
   try {
-    const placed = await place(name, await parse(name, bytes));
+    const placed = await place(name, await parse(name, new Uint8Array(bytes)));
     if (placed.every((one) => one.mesh.corners.length === 0))
       throw new Trouble(`${name} has nothing to draw.`, "Check that it has meshes of triangles in a scene.");
     return assemble(name, placed);
   } catch (error) {
-    // Of the stack or of an array's length: nodes in nodes in nodes, or too many of something.
-    if (!(error instanceof RangeError)) throw error;
-    throw new Trouble(`${name} is too deep or too large.`, "Open a simpler file.");
+    if (!(error instanceof RangeError)) throw error; // of an array's length
+    throw new Trouble(`${name} is too large.`, "Open a smaller file.");
   }
 }
 
@@ -78,7 +83,9 @@ async function parse(name: string, bytes: Uint8Array<ArrayBuffer>): Promise<Docu
       throw new Trouble(`${name} needs ${unknown.join(", ")}, which is not supported here.`, "Export it without.");
     }
     json.json.extensionsRequired = [];
-    const elements = (json.json.accessors ?? []).reduce((sum, { count }) => sum + count, 0);
+    const counts = (json.json.accessors ?? []).map(({ count }) => count);
+    if (!counts.every((count) => Number.isInteger(count) && count > 0)) throw new Error("a count is none");
+    const elements = counts.reduce((sum, count) => sum + count, 0);
     if (elements > MOST_ELEMENTS) throw tooLarge(name, elements, "elements of attributes and indices");
     return await io.readJSON(json);
   } catch (error) {
@@ -98,29 +105,30 @@ async function place(name: string, document: Document): Promise<Placed[]> {
   const shown = root.getDefaultScene() ?? root.listScenes()[0];
   const looks = new Map<Material | null, Look>();
   const meshes = new Map<Primitive, Mesh>();
-  const waiting: { primitive: Primitive; matrix: readonly number[] }[] = [];
-  shown?.traverse((node) => {
-    const primitives = node.getMesh()?.listPrimitives() ?? [];
-    if (primitives.length === 0) return;
-    const matrix = node.getWorldMatrix();
-    for (const primitive of primitives) {
+  const images = new Map<Texture, ImageBitmap>();
+  const waiting: { primitive: Primitive; matrix: Mat4 }[] = [];
+  const nodes = (shown?.listChildren() ?? []).map((node) => ({ node, matrix: node.getMatrix() as Mat4 }));
+  let [vertices, corners] = [0, 0];
+  for (const { node, matrix } of nodes) {
+    for (const child of node.listChildren()) nodes.push({ node: child, matrix: product(matrix, child.getMatrix()) });
+    for (const primitive of node.getMesh()?.listPrimitives() ?? []) {
       if (![TRIANGLES, STRIP, FAN].includes(primitive.getMode()) || !primitive.getAttribute("POSITION")) continue;
+      // Before anything is unpacked, and as often as it is placed: many nodes may have one mesh.
+      const size = sizeOf(primitive);
+      vertices += size.vertices;
+      corners += size.corners;
+      if (vertices > MOST_VERTICES) throw tooLarge(name, vertices, "vertices");
+      if (corners > MOST_CORNERS) throw tooLarge(name, Math.floor(corners / 3), "triangles");
       waiting.push({ primitive, matrix });
     }
-  });
+  }
   const placed: Placed[] = [];
-  let [vertices, corners] = [0, 0];
   for (const { primitive, matrix } of waiting) {
     const material = primitive.getMaterial();
-    if (!looks.has(material)) looks.set(material, await lookOf(name, material));
+    if (!looks.has(material)) looks.set(material, await lookOf(name, material, images));
     const look = looks.get(material)!;
     if (!meshes.has(primitive)) meshes.set(primitive, meshOf(primitive, look.uv));
     const mesh = meshes.get(primitive)!;
-    // Counted as they are placed: many nodes may have one mesh.
-    vertices += mesh.points.length;
-    corners += mesh.corners.length;
-    if (vertices > MOST_VERTICES) throw tooLarge(name, vertices, "vertices");
-    if (corners > MOST_CORNERS) throw tooLarge(name, corners / 3, "triangles");
     const rows = cofactors(matrix);
     const turn = (v: Vec3): Vec3 =>
       unit([0, 1, 2].map((c) => rows[0][c]! * v[0] + rows[1][c]! * v[1] + rows[2][c]! * v[2]) as unknown as Vec3);
@@ -134,11 +142,11 @@ async function place(name: string, document: Document): Promise<Placed[]> {
   return placed;
 }
 
-async function lookOf(name: string, material: Material | null): Promise<Look> {
+async function lookOf(name: string, material: Material | null, images: Map<Texture, ImageBitmap>): Promise<Look> {
   const mode = material?.getAlphaMode() ?? "OPAQUE";
   const factor = (material?.getBaseColorFactor() ?? [1, 1, 1, 1]).map((x) => Math.min(Math.max(x, 0), 1));
   const scale = factor as unknown as Look["scale"];
-  const image = material ? await imageOf(name, material) : null;
+  const image = material ? await imageOf(name, material, images) : null;
   const threshold = mode === "MASK" ? (material?.getAlphaCutoff() ?? 0.5) : 0;
   const alpha = Math.floor(scale[3] * 255 + 0.5);
   let layer: Layer = image || mode === "MASK" || alpha === 255 ? "mixed" : "transparent";
@@ -149,27 +157,45 @@ async function lookOf(name: string, material: Material | null): Promise<Look> {
   return { layer, image, scale: image ? scale : white, threshold, base: image ? white : scale, uv };
 }
 
-async function imageOf(name: string, material: Material): Promise<Image | null> {
+async function imageOf(name: string, material: Material, images: Map<Texture, ImageBitmap>): Promise<Image | null> {
   const texture = material.getBaseColorTexture();
   const content = texture?.getImage();
   if (!texture || !content) return null;
-  const blob = new Blob([content as Uint8Array<ArrayBuffer>], { type: texture.getMimeType() });
-  let pixels: ImageBitmap;
-  try {
-    pixels = await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
-  } catch {
-    throw new Trouble(`An image in ${name} cannot be read.`, "Export it with PNG or JPEG images.");
+  let pixels = images.get(texture);
+  if (!pixels) {
+    const blob = new Blob([content as Uint8Array<ArrayBuffer>], { type: texture.getMimeType() });
+    try {
+      const sizes = [texture.getSize() ?? [0, 0], ...[...images.values()].map(({ width, height }) => [width, height])];
+      const texels = sizes.reduce((sum, [width, height]) => sum + width! * height!, 0);
+      if (texels > MOST_TEXELS) throw tooLarge(name, texels, "pixels of images");
+      pixels = await createImageBitmap(blob, { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+    } catch (error) {
+      if (error instanceof Trouble) throw error;
+      throw new Trouble(`An image in ${name} cannot be read.`, "Export it with PNG or JPEG images.");
+    }
+    images.set(texture, pixels);
   }
   const info = material.getBaseColorTextureInfo();
   const wrap = [info?.getWrapS(), info?.getWrapT()].map((each) => WRAPS[each ?? 10497] ?? "repeat");
   return { pixels, wrap: wrap as unknown as Image["wrap"] };
 }
 
+/** What `meshOf` makes of it, at most. */
+function sizeOf(primitive: Primitive): { vertices: number; corners: number } {
+  const points = primitive.getAttribute("POSITION")!.getCount();
+  const listed = primitive.getIndices()?.getCount() ?? points;
+  const corners = primitive.getMode() === TRIANGLES ? listed : 3 * listed;
+  const normals = primitive.getAttribute("NORMAL");
+  const isFaceted = normals?.getCount() !== points || normals.getElementSize() < 3;
+  return { vertices: isFaceted ? Math.max(points, corners) : points, corners };
+}
+
 function meshOf(primitive: Primitive, uv: string): Mesh {
+  const count = primitive.getAttribute("POSITION")!.getCount();
   const attribute = (name: string, width: number): number[][] => {
     const accessor = primitive.getAttribute(name);
-    if (!accessor || accessor.getElementSize() < width) return [];
-    return Array.from({ length: accessor.getCount() }, (_, i) => accessor.getElement(i, []).slice(0, width));
+    if (accessor?.getCount() !== count || accessor.getElementSize() < width) return [];
+    return Array.from({ length: count }, (_, i) => accessor.getElement(i, []).slice(0, width));
   };
   const points = attribute("POSITION", 3) as unknown as Vec3[];
   const indices = primitive.getIndices();
@@ -217,7 +243,7 @@ function assemble(name: string, placed: readonly Placed[]): Scene {
     }
   }
   const origin = scaled([low[0] + high[0], low[1] + high[1], low[2] + high[2]], 0.5);
-  if (!origin.every(Number.isFinite)) {
+  if (![...origin, ...subtract(high, origin)].every((each) => Number.isFinite(Math.fround(each)))) {
     throw new Trouble(`${name} has points that are not finite.`, "Look for NaN or huge numbers in it.");
   }
   const vertices = placed.reduce((sum, one) => sum + one.points.length, 0);

@@ -2,6 +2,7 @@
 
 import shells from "../samples/shells.glb?url";
 import shelf from "../samples/shelf.glb?url";
+import type { Bundle } from "./bundle";
 import type { View } from "./camera";
 import { Gpu } from "./gpu";
 import { readGlb } from "./gltf";
@@ -77,8 +78,10 @@ async function start(): Promise<void> {
 function listen(stage: Stage): void {
   const changed = (id: string, act: () => unknown): void =>
     at(id).addEventListener(id === "budget" || id === "split" ? "input" : "change", () => void act());
-  changed("scene", () => openSample(stage));
-  changed("file", () => openFile(stage, at<HTMLInputElement>("file").files?.[0]));
+  changed("scene", () => (select("scene").value ? openSample(stage) : openFile(stage, own)));
+  const file = at<HTMLInputElement>("file");
+  changed("file", () => openFile(stage, file.files?.[0]));
+  file.addEventListener("click", () => (file.value = "")); // else the same file, chosen again, is no change
   changed("model", () => loadModel(stage));
   changed("mode", () => setMode(stage));
   changed("split", () => setSplit(stage, at<HTMLInputElement>("split").valueAsNumber / 100));
@@ -113,22 +116,26 @@ const openSample = (stage: Stage): Promise<void> =>
     if (isWanted()) await stage.open(scene);
   });
 
-async function sample(address: string): Promise<Uint8Array<ArrayBuffer>> {
+async function sample(address: string): Promise<Blob> {
   try {
     const answer = await fetch(address);
-    if (answer.ok) return new Uint8Array(await answer.arrayBuffer());
+    if (answer.ok) return await answer.blob();
   } catch {
     // The network: the same to do.
   }
   throw new Trouble("The sample cannot be loaded.", "Check the connection, then load the page again.");
 }
 
+/** The last one that was opened; among the scenes it has no name of its own. */
+let own: File | undefined;
+
 async function openFile(stage: Stage, file: File | undefined): Promise<void> {
   if (!file) return;
   await busy("scene", "The file is read.", async (isWanted) => {
-    const scene = await readGlb(file.name, new Uint8Array(await file.arrayBuffer()));
+    const scene = await readGlb(file.name, file);
     if (!isWanted()) return;
     await stage.open(scene);
+    own = file;
     if (!Array.from(select("scene").options).some((option) => option.value === "")) {
       select("scene").prepend(new Option("", ""));
     }
@@ -155,7 +162,8 @@ function setMode(stage: Stage): void {
   at("legend").hidden = mode === "picture";
   at("ramp").className = mode;
   at("legend-text").textContent = LEGENDS[mode];
-  stage.draw();
+  if (mode === "error") stage.draw();
+  else stage.present();
 }
 
 function setSplit(stage: Stage, split: number): void {
@@ -188,7 +196,6 @@ async function offerModels(stage: Stage): Promise<void> {
     select("model").disabled = false;
     select("model").value = names[0]![0];
     await loadModel(stage);
-    if (stage.bundle) choose(stage, "right", "kbuffer-deep");
   } catch (error) {
     note.textContent = error instanceof Error ? error.message : "";
     if (!(error instanceof SignedOut)) return;
@@ -203,21 +210,29 @@ async function loadModel(stage: Stage): Promise<void> {
   const [name, selector] = chosenModel();
   const note = at("model-note");
   note.textContent = "";
-  stage.bundle = null;
-  if (!name || !selector) await busy("model", "", async () => {}); // what is still being fetched is not wanted
-  else {
-    await busy("model", "The model is fetched.", async (isWanted) => {
-      const bundle = await registry.pull(name, selector);
-      await selfTest(stage.gpu, bundle);
+  const use = (bundle: Bundle | null): void => {
+    const isFirst = bundle !== null && stage.bundle === null;
+    stage.bundle = bundle;
+    choose(stage, "left", stage.wanted.left);
+    choose(stage, "right", isFirst ? "kbuffer-deep" : stage.wanted.right);
+  };
+  // The last model is drawn with until this one is there, or refused.
+  await busy("model", name ? "The model is fetched." : "", async (isWanted) => {
+    try {
+      const bundle = name && selector ? await registry.pull(name, selector) : null;
+      if (bundle) await selfTest(stage.gpu, bundle);
       if (!isWanted()) return;
-      stage.bundle = bundle;
+      use(bundle);
+      if (!bundle) return;
       const signed = bundle.isSigned
         ? "signature and hashes are right"
         : "hashes are right; this browser cannot check the signature (it has no Ed25519), and trusts the server";
       note.textContent = `${name} ${bundle.version}: ${signed}; its self-test passes on this device.`;
-    });
-  }
-  for (const side of ["left", "right"] as const) choose(stage, side, stage.wanted[side]);
+    } catch (error) {
+      if (isWanted()) use(null);
+      throw error;
+    }
+  });
 }
 
 start().catch((error: unknown) => {

@@ -20,7 +20,10 @@ const MOST_BYTES = 64 * 2 ** 20;
 const MOST_MANIFEST_BYTES = 2 ** 20;
 const MOST_FILES = 16;
 const MOST_FEATURES = 256;
-const OUTPUTS = ["a,b", "a,b,g"];
+const OUTPUTS: Readonly<Record<string, readonly string[]>> = {
+  "gain-curve": ["a,b", "a,b,g"],
+  importance: ["importance"],
+};
 
 export interface Manifest {
   readonly tail: Tail;
@@ -42,8 +45,9 @@ export function parseManifest(content: string): Manifest {
   if (unknown.length) throw new Error(`${unknown.join(", ")} is unknown`);
   const { name, g } = object(fields["tail"]);
   const tail = tailOf(String(name), number(g));
-  if (fields["head"] !== "gain-curve" || !OUTPUTS.includes(String(fields["outputs"]))) {
-    throw new Error("this page renders bundles with the head gain-curve");
+  const head = String(fields["head"]);
+  if (!Object.hasOwn(OUTPUTS, head) || !OUTPUTS[head]!.includes(String(fields["outputs"]))) {
+    throw new Error(`it has a head that is none, ${head} with ${fields["outputs"]}`);
   }
   if (!tail || tail.g < 0) throw new Error(`it has a tail that is none, ${name}`);
   const features = list(fields["features"], MOST_FEATURES);

@@ -20,6 +20,11 @@ export function unit(a: Vec3): Vec3 {
   return size > 0 ? scaled(a, 1 / size) : [0, 0, 1];
 }
 
+/** What the second matrix does, then the first. */
+export function product(one: Mat4, two: Mat4): Mat4 {
+  return one.map((_, i) => [0, 1, 2, 3].reduce((sum, k) => sum + one[(i % 4) + 4 * k]! * two[i - (i % 4) + k]!, 0));
+}
+
 /** A point through an affine matrix. */
 export function transformed(m: Mat4, p: Vec3): Vec3 {
   return [

@@ -3,7 +3,7 @@
 
 import type { ModelPage, ProblemDocument } from "./api";
 import type { Bundle } from "./bundle";
-import { MANIFEST, NETWORK, parseManifest } from "./manifest";
+import { MANIFEST, NETWORK, object, parseManifest } from "./manifest";
 import { type Release, isLower, parseRelease, sha256, verify } from "./release";
 import { Trouble } from "./trouble";
 
@@ -23,6 +23,13 @@ export type Memory = Pick<Storage, "getItem" | "setItem" | "removeItem">;
 interface Seen {
   readonly etag: string;
   readonly record: string;
+}
+
+/** What the server said, all of it. */
+interface Answer {
+  readonly status: number;
+  readonly headers: Headers;
+  readonly content: ArrayBuffer;
 }
 
 /** A model that can be asked for. */
@@ -52,13 +59,13 @@ export class Registry {
   /** All aliases of all models, champions first. */
   async choices(): Promise<Choice[]> {
     // Asked first: the browser writes an error on its console where a request is refused.
-    const { signed_in: isSignedIn } = (await (await this.#get(SESSION)).json()) as { signed_in?: unknown };
+    const { signed_in: isSignedIn } = parsed(await this.#get(SESSION)) as { signed_in?: unknown };
     if (isSignedIn !== true) throw new SignedOut();
     const found: Choice[] = [];
     let address: string | null = `${REGISTRY}/models?limit=200`;
     while (address) {
-      const answer: Response = await this.#get(address);
-      const page = (await answer.json()) as ModelPage;
+      const answer: Answer = await this.#get(address);
+      const page = parsed(answer) as ModelPage;
       for (const { name, aliases, latest } of page.items) {
         const known = Object.entries(aliases);
         for (const [selector, version] of known) found.push({ name, selector, version });
@@ -119,12 +126,12 @@ export class Registry {
     const headers: Record<string, string> = seen ? { "If-None-Match": seen.etag } : {};
     const answer = await this.#get(`${REGISTRY}/models/${name}/versions/${selector}`, { headers, cache: "no-store" });
     if (answer.status === 304 && seen) return seen;
-    return { etag: answer.headers.get("etag") ?? "", record: await answer.text() };
+    return { etag: answer.headers.get("etag") ?? "", record: text(answer.content) };
   }
 
   async #bundle(release: Release): Promise<Omit<Bundle, "isSigned">> {
     const { name, version, files } = release;
-    const manifestText = new TextDecoder().decode(await this.#file(release, MANIFEST));
+    const manifestText = text(await this.#file(release, MANIFEST));
     let manifest;
     try {
       manifest = parseManifest(manifestText);
@@ -143,14 +150,14 @@ export class Registry {
     // Every file, though only one is compiled: a damaged bundle is not half right.
     const others = Object.keys(manifest.files);
     const contents = await Promise.all(others.map((file) => this.#file(release, file)));
-    const wgsl = new TextDecoder().decode(contents[others.indexOf(NETWORK)]);
+    const wgsl = text(contents[others.indexOf(NETWORK)]!);
     return { name, version, tail: manifest.tail, wgsl, selfTest: manifest.selfTest };
   }
 
   /** A file of a release, whose size and hash are right. */
   async #file(release: Release, name: string): Promise<ArrayBuffer> {
     const { sha256: hash, bytes } = release.files[name]!;
-    const content = await (await this.#get(`${REGISTRY}/blobs/sha256/${hash}`)).arrayBuffer();
+    const { content } = await this.#get(`${REGISTRY}/blobs/sha256/${hash}`);
     if (content.byteLength !== bytes || (await sha256(content)) !== hash) {
       throw new Trouble(
         `${name} of '${release.name}' ${release.version} is not the file that was published.`,
@@ -160,20 +167,41 @@ export class Registry {
     return content;
   }
 
-  async #get(address: string, options: RequestInit = {}): Promise<Response> {
+  async #get(address: string, options: RequestInit = {}): Promise<Answer> {
     let answer: Response;
+    let content: ArrayBuffer;
     try {
       answer = await this.ask(address, { credentials: "same-origin", redirect: "error", ...options });
+      content = await answer.arrayBuffer(); // a connection may break on the way
     } catch {
       throw new Trouble("The server cannot be reached.", "Check the connection, then try again.");
     }
-    if (answer.ok || answer.status === 304) return answer;
-    if (answer.status === 401) throw new SignedOut();
-    const problem = (await answer.json().catch(() => ({}))) as Partial<ProblemDocument>;
+    const { ok, status, headers } = answer;
+    if (ok || status === 304) return { status, headers, content };
+    if (status === 401) throw new SignedOut();
+    const problem = problemOf(content);
     throw new Trouble(
-      problem.detail || problem.title || `The server answered ${answer.status}.`,
+      problem.detail || problem.title || `The server answered ${status}.`,
       problem.remedy || "Try again.",
     );
+  }
+}
+
+const text = (content: ArrayBuffer): string => new TextDecoder().decode(content);
+
+function parsed({ content }: Answer): unknown {
+  try {
+    return JSON.parse(text(content));
+  } catch {
+    throw new Trouble("The server's answer cannot be understood.", "Ask who runs it: something may be in between.");
+  }
+}
+
+function problemOf(content: ArrayBuffer): Partial<ProblemDocument> {
+  try {
+    return object(JSON.parse(text(content)));
+  } catch {
+    return {};
   }
 }
 
@@ -192,6 +220,6 @@ function checkOrder(release: Release, before: Release, selector: string): void {
   }
 }
 
-function nextOf(answer: Response): string | null {
+function nextOf(answer: Answer): string | null {
   return /<(\/demo\/v1\/models[^>]*)>; rel="next"/.exec(answer.headers.get("link") ?? "")?.[1] ?? null;
 }

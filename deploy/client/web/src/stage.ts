@@ -120,9 +120,9 @@ export class Stage {
     this.#while(() => this.#drawAll());
   }
 
-  /** Shows what was drawn once more, with another split or mode. */
+  /** Shows what was drawn once more, with another split or mode; also while something else is being drawn. */
   present(): void {
-    if (this.#shown && this.#renderer && !this.#busy && !this.#lost) this.#show(this.#renderer);
+    if (this.#shown && this.#renderer && !this.#lost) this.#show(this.#renderer);
   }
 
   /** The picture of a technique at the canvas's size. */

@@ -5,10 +5,9 @@ import { framingView, turned } from "../src/camera";
 import { readGlb } from "../src/gltf";
 import { length, subtract } from "../src/math";
 
-const sample = (name: string) =>
-  new Uint8Array(readFileSync(new URL(`../samples/${name}.glb`, import.meta.url))) as Uint8Array<ArrayBuffer>;
+const sample = (name: string) => new Blob([readFileSync(new URL(`../samples/${name}.glb`, import.meta.url))]);
 
-function glb(json: unknown): Uint8Array<ArrayBuffer> {
+function glb(json: unknown): Blob {
   let text = JSON.stringify(json);
   text += " ".repeat(-text.length & 3);
   const file = Buffer.alloc(20 + text.length);
@@ -16,7 +15,7 @@ function glb(json: unknown): Uint8Array<ArrayBuffer> {
   [2, file.length, text.length].forEach((word, i) => file.writeUInt32LE(word, 4 + 4 * i));
   file.write("JSON", 16);
   file.write(text, 20);
-  return new Uint8Array(file) as Uint8Array<ArrayBuffer>;
+  return new Blob([file]);
 }
 
 it.each(["shells", "shelf"])("the sample %s is read", async (name) => {
@@ -33,18 +32,23 @@ it.each(["shells", "shelf"])("the sample %s is read", async (name) => {
 it("what is no glTF, needs too much or has nothing is refused with a remedy", async () => {
   const asset = { version: "2.0" };
   await expect(readGlb("x", sample("shells").slice(0, 400))).rejects.toThrow("cannot be read");
-  await expect(readGlb("x", new Uint8Array(0))).rejects.toThrow("cannot be read");
+  await expect(readGlb("x", new Blob([]))).rejects.toThrow("cannot be read");
   await expect(readGlb("x", glb({ asset, extensionsRequired: ["KHR_draco_mesh_compression"] }))).rejects.toThrow(
     "draco",
   );
   await expect(readGlb("x", glb({ asset, scenes: [{ nodes: [] }] }))).rejects.toThrow("nothing to draw");
+  const refused = () => Promise.reject(new DOMException("no", "NotFoundError"));
+  const folder = Object.assign(new Blob(["x"]), { arrayBuffer: refused });
+  await expect(readGlb("x", folder)).rejects.toThrow("choose it again");
+  const large = Object.defineProperty(new Blob(["x"]), "size", { value: 2 ** 32 });
+  await expect(readGlb("x", large)).rejects.toThrow("larger than 256 MiB");
 });
 
 const TRIANGLE = Buffer.from(new Float32Array([0, 0, 0, 1, 0, 0, 0, 1, 0]).buffer).toString("base64");
 const PRIMITIVE = { attributes: { POSITION: 0 }, material: 0 };
 
 /** A glTF of one triangle, whose members may be others. */
-function triangle(others: Record<string, unknown> = {}): Uint8Array<ArrayBuffer> {
+function triangle(others: Record<string, unknown> = {}): Blob {
   return glb({
     asset: { version: "2.0" },
     scenes: [{ nodes: [0] }],
@@ -58,20 +62,35 @@ function triangle(others: Record<string, unknown> = {}): Uint8Array<ArrayBuffer>
   });
 }
 
-it("counts that no file means, nodes without end and meshes without triangles are refused, at once", async () => {
+it("counts that no file means, points nowhere and meshes without triangles are refused, at once", async () => {
   const accessor = { bufferView: 0, componentType: 5126, count: 3, type: "VEC3" };
   const without = { componentType: 5126, count: 300_000_000, type: "VEC3" };
   await expect(readGlb("x", triangle({ accessors: [without] }))).rejects.toThrow("300,000,000 elements");
   await expect(readGlb("x", triangle({ accessors: [{ ...without, count: 4e9 }] }))).rejects.toThrow("elements");
+  await expect(readGlb("x", triangle({ accessors: [without, { ...without, count: -3e8 }] }))).rejects.toThrow("read");
+  const unpacked = readGlb("x", triangle({ accessors: [{ ...without, count: 30_000_000 }] }));
+  await expect(unpacked).rejects.toThrow("30,000,000 vertices");
+  const indexed = [{ primitives: [{ attributes: { POSITION: 0 }, indices: 1 }] }];
+  const corners = { ...without, componentType: 5125, type: "SCALAR", count: 20_000_000 };
+  const faceted = readGlb("x", triangle({ meshes: indexed, accessors: [accessor, corners] }));
+  await expect(faceted).rejects.toThrow("20,000,000 vertices");
   const many = Array.from({ length: 3000 }, () => ({ mesh: 0 }));
   const scenes = [{ nodes: many.map((_, i) => i) }];
   const large = { componentType: 5126, count: 30_000, type: "VEC3" };
   await expect(readGlb("x", triangle({ scenes, nodes: many, accessors: [large] }))).rejects.toThrow("vertices");
-  const deep = [...Array.from({ length: 15_000 }, (_, i) => ({ children: [i + 1] })), { mesh: 0 }];
-  await expect(readGlb("x", triangle({ nodes: deep }))).rejects.toThrow("too deep");
+  await expect(readGlb("x", triangle({ nodes: [{ mesh: 0, scale: [1e39, 1, 1] }] }))).rejects.toThrow("finite");
   const normals = [{ primitives: [{ attributes: { POSITION: 0, NORMAL: 0 } }] }];
   const two = { meshes: normals, accessors: [{ ...accessor, count: 2 }] };
   await expect(readGlb("x", triangle(two))).rejects.toThrow("nothing to draw");
+}, 20_000);
+
+it("nodes move what is in them, however deep", async () => {
+  const quarter = [0, 0, Math.SQRT1_2, Math.SQRT1_2];
+  const nodes = [{ children: [1], scale: [1, 4, 1] }, { mesh: 0, rotation: quarter }];
+  const { bounds } = await readGlb("x", triangle({ nodes }));
+  [0.5, 2, 0].forEach((half, c) => expect(bounds[1][c]).toBeCloseTo(half, 12));
+  const chain = Array.from({ length: 9_000 }, (_, i) => ({ mesh: 0, children: i < 8_999 ? [i + 1] : [] }));
+  expect((await readGlb("x", triangle({ nodes: chain }))).indices.length).toBe(27_000);
 }, 20_000);
 
 it("materials that differ in colour alone are drawn together, each in its colour", async () => {
@@ -91,7 +110,28 @@ it("an image that is none is refused with a remedy", async () => {
   vi.stubGlobal("createImageBitmap", () => Promise.reject(new DOMException("no", "InvalidStateError")));
   const materials = [{ pbrMetallicRoughness: { baseColorTexture: { index: 0 } } }];
   const images = [{ bufferView: 0, mimeType: "image/png" }];
-  await expect(readGlb("x", triangle({ materials, images, textures: [{ source: 0 }] }))).rejects.toThrow("An image in x");
+  const textures = [{ source: 0 }];
+  await expect(readGlb("x", triangle({ materials, images, textures }))).rejects.toThrow("An image in x");
+  const header = Buffer.alloc(36);
+  header.write("89504e470d0a1a0a0000000d49484452", "hex");
+  [16, 20].forEach((at) => header.writeUInt32BE(30_000, at));
+  const buffers = [{ byteLength: 36, uri: `data:application/octet-stream;base64,${header.toString("base64")}` }];
+  const accessors = [{ componentType: 5126, count: 3, type: "VEC3" }];
+  const vast = readGlb("x", triangle({ materials, images, textures, buffers, accessors }));
+  await expect(vast).rejects.toThrow("900,000,000 pixels");
+  vi.unstubAllGlobals();
+});
+
+it("an image of many materials is decoded once", async () => {
+  const decode = vi.fn(() => Promise.resolve({ width: 1, height: 1 }));
+  vi.stubGlobal("createImageBitmap", decode);
+  const look = (shade: number) => ({ baseColorTexture: { index: 0 }, baseColorFactor: [shade, 1, 1, 1] });
+  const materials = [0.25, 0.5].map((shade) => ({ pbrMetallicRoughness: look(shade) }));
+  const meshes = [{ primitives: [0, 1].map((material) => ({ ...PRIMITIVE, material })) }];
+  const images = [{ bufferView: 0, mimeType: "image/png" }];
+  const { batches } = await readGlb("x", triangle({ materials, meshes, images, textures: [{ source: 0 }] }));
+  expect(batches.map(({ scale }) => scale[0])).toEqual([0.25, 0.5]);
+  expect(decode).toHaveBeenCalledOnce();
   vi.unstubAllGlobals();
 });
 

@@ -97,6 +97,16 @@ describe("a bundle that is refused", () => {
     expect(service.asked).toEqual([]);
   });
 
+  it("a connection that breaks on the way, and an answer of something in between, are said", async () => {
+    const broken = () => new ReadableStream({ pull: (stream) => stream.error(new TypeError("network error")) });
+    const half = async (address: RequestInfo | URL, options?: RequestInit): Promise<Response> =>
+      String(address).includes("/blobs/") ? new Response(broken()) : service.fetch(address, options);
+    await expect(new Registry(memory, half).pull("glass", "champion")).rejects.toThrow("cannot be reached");
+    expect(memory.kept.size).toBe(0);
+    const page = async (): Promise<Response> => new Response("<!doctype html>");
+    await expect(new Registry(memory, page).choices()).rejects.toThrow("cannot be understood");
+  });
+
   it("whoever is signed out is told so", async () => {
     service.status = 401;
     await expect(pull()).rejects.toBeInstanceOf(SignedOut);
@@ -111,6 +121,10 @@ describe("a manifest", () => {
   it("is read", () => expect(parse({}).tail.bins).toBe(16));
   it("may have a tail without bins", () =>
     expect(parse({ tail: { name: "density", g: 1 } }).tail).toEqual({ name: "density", bins: 0, g: 1 }));
+  it("may have a network of importances", () => {
+    const self_test = { features: [[1]], outputs: [[0.5]], output_scale: [1], tolerance: {} };
+    expect(parse({ head: "importance", outputs: ["importance"], self_test }).selfTest).toEqual(self_test);
+  });
   it.each([
     [{ surprise: 1 }, "surprise is unknown"],
     [{ parity: undefined }, "parity is missing"],
@@ -119,6 +133,7 @@ describe("a manifest", () => {
     [{ tail: { name: "density", g: -1 } }, "density"],
     [{ tail: { name: "density" } }, "not finite"],
     [{ head: "importance" }, "head"],
+    [{ head: "toString" }, "head"],
     [{ features: [{ name: "log_n", mean: 0, std: 0 }] }, "spread"],
     [{ files: { "../x": file } }, "name or hash"],
     [{ files: { "predict.glsl": file } }, "no predict.wgsl"],

@@ -1,7 +1,7 @@
 // A scene on the GPU, and its geometry passes: one vertex shader, so that depth is the same in all of them.
 
 import { type Gpu, type Resource, entriesOf, groupsFor } from "../gpu";
-import type { Batch, Image, Layer, Scene } from "../scene";
+import type { Batch, Layer, Scene } from "../scene";
 import { shader } from "../shaders";
 import type { Tail } from "../tail";
 import { Trouble } from "../trouble";
@@ -94,10 +94,11 @@ export class Geometry {
         ],
       }),
     };
-    const textures = new Map<Image | null, GPUTexture>();
+    const textures = new Map<ImageBitmap | null, GPUTexture>();
     this.#drawn = scene.batches.map((batch) => {
-      if (!textures.has(batch.image)) textures.set(batch.image, upload(gpu, batch.image));
-      return { batch, look: this.#look(batch, textures.get(batch.image)!.createView()) };
+      const pixels = batch.image?.pixels ?? null; // of one image there may be many looks
+      if (!textures.has(pixels)) textures.set(pixels, upload(gpu, pixels));
+      return { batch, look: this.#look(batch, textures.get(pixels)!.createView()) };
     });
     this.#textures = [...textures.values()];
   }
@@ -303,9 +304,9 @@ export function runsOf(areas: ArrayLike<number>, indices: number): Run[] {
 }
 
 /** An image with its mipmaps; none is one white texel. */
-function upload(gpu: Gpu, image: Image | null): GPUTexture {
+function upload(gpu: Gpu, pixels: ImageBitmap | null): GPUTexture {
   const { device } = gpu;
-  const [width, height] = image ? [image.pixels.width, image.pixels.height] : [1, 1];
+  const { width, height } = pixels ?? { width: 1, height: 1 };
   const most = device.limits.maxTextureDimension2D;
   if (Math.max(width, height) > most) {
     throw new Trouble(`An image of ${width} × ${height} is above this device's limit, ${most}.`, "Make it smaller.");
@@ -316,11 +317,11 @@ function upload(gpu: Gpu, image: Image | null): GPUTexture {
     mipLevelCount: 1 + Math.floor(Math.log2(Math.max(width, height))),
     usage: GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.COPY_DST | GPUTextureUsage.RENDER_ATTACHMENT,
   });
-  if (!image) {
+  if (!pixels) {
     device.queue.writeTexture({ texture }, new Uint8Array([255, 255, 255, 255]), {}, [1, 1]);
     return texture;
   }
-  device.queue.copyExternalImageToTexture({ source: image.pixels }, { texture }, [width, height]);
+  device.queue.copyExternalImageToTexture({ source: pixels }, { texture }, [width, height]);
   const module = device.createShaderModule({ code: shader(["cover", "mipmap"]) });
   const pipeline = device.createRenderPipeline({
     layout: "auto",

@@ -9,13 +9,17 @@ import type { Allocation } from "./allocation";
 import type { Frame } from "./frame";
 import type { Sums } from "./sums";
 
+/** The network's text; one number is answered as a scalar, which a shader turns into the vector that it expects. */
+const textOf = ({ wgsl, selfTest }: Bundle): string =>
+  `${wgsl}\nalias Answer = vec${Math.max(selfTest.outputs[0]!.length, 2)}f;`;
+
 const FILES = ["state", "statistics", "depth_bins", "curves"];
 
 /** Predicts a and 1 / b of every pixel that has a choice, into the allocation's curves. */
 export function predict(frame: Frame, work: Work, bundle: Bundle, sums: Sums, into: Allocation): void {
   const textures = [frame.background, ...sums.targets].map((texture) => texture.createView());
   const buffers = [into.state, frame.statistics, sums.gathered, into.curves];
-  const options = { tail: bundle.tail, before: bundle.wgsl };
+  const options = { tail: bundle.tail, before: textOf(bundle) };
   frame.forPixels(work, FILES, "predict_curves", [...buffers, ...textures], options);
 }
 
@@ -28,7 +32,7 @@ export async function selfTest(gpu: Gpu, bundle: Bundle): Promise<void> {
   const { features, outputs, output_scale: scale, tolerance } = bundle.selfTest;
   const { STORAGE, COPY_SRC } = GPUBufferUsage;
   gpu.device.pushErrorScope("validation");
-  const pipeline = gpu.compute(shader(["self_test"], bundle.tail, bundle.wgsl), "answer_rows");
+  const pipeline = gpu.compute(shader(["self_test"], bundle.tail, textOf(bundle)), "answer_rows");
   const rows = gpu.filled(new Float32Array(features.flat()), STORAGE);
   const answers = gpu.filled(new Float32Array(outputs.flat().length), STORAGE | COPY_SRC);
   const encoder = gpu.device.createCommandEncoder();

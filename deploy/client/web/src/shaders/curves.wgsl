@@ -1,5 +1,5 @@
 // The bundle's network on the gathered sums of every pixel with a choice: a and 1 / b of log gain(k) = a - b (k - 1)
-// (renderer/shaders/kbuffer-deep/curves.comp).
+// (renderer/shaders/kbuffer-deep/curves.comp). An importance w is a curve, too: k = floor(t w) at the price t.
 @group(0) @binding(0) var<storage, read> state: State;
 @group(0) @binding(1) var<storage, read> statistics: array<Statistics>;
 @group(0) @binding(2) var<storage, read> gathered: array<u32>;
@@ -43,6 +43,10 @@ fn predict_curves(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgro
     if (p >= arrayLength(&curves) || state.complete == 1u || statistics[p].n <= state.k_min) {
         return;
     }
-    let gain = diaphane_predict(diaphane_features(sums_of(p)));
-    curves[p] = vec2f(within(gain.x, -MOST_GAIN, MOST_GAIN), within(1.0 / gain.y, LEAST_RATE, MOST_RATE));
+    let y = Answer(diaphane_predict(diaphane_features(sums_of(p))));
+    var curve = vec2f(y.x, 1.0 / y.y);
+    if (DIAPHANE_OUTPUTS == 1) {
+        curve = vec2f(-1.5 / y.x, y.x);
+    }
+    curves[p] = vec2f(within(curve.x, -MOST_GAIN, MOST_GAIN), within(curve.y, LEAST_RATE, MOST_RATE));
 }

@@ -12,7 +12,7 @@ fn answer_rows(@builtin(global_invocation_id) id: vec3u) {
     for (var i = 0u; i < DIAPHANE_FEATURES; i++) {
         x[i] = features[row * DIAPHANE_FEATURES + i];
     }
-    let y = diaphane_predict(x);
+    let y = Answer(diaphane_predict(x));
     for (var i = 0u; i < DIAPHANE_OUTPUTS; i++) {
         answers[row * DIAPHANE_OUTPUTS + i] = y[i];
     }
