@@ -1,5 +1,1 @@
-"""The REST interface: `create_app` over a `Service`."""
-
-from services.api.application import create_app
-
-__all__ = ["create_app"]
+"""The REST interface; `application.create_app` makes it over a `Service`."""

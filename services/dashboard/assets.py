@@ -17,6 +17,9 @@ from services.report.page import TEMPLATES
 
 HTMX = "2.0.11"
 """Version of the vendored htmx (https://htmx.org, Zero-Clause BSD); `htmx.min.js` is as released."""
+IDIOMORPH = "0.8.0"
+"""Version of the vendored idiomorph, htmx's morphing swap (https://github.com/bigskysoftware/idiomorph, Zero-Clause
+BSD); `idiomorph-ext.min.js` is as released."""
 
 router = APIRouter(prefix="/static", include_in_schema=False)
 
@@ -28,6 +31,8 @@ _SOURCES: dict[str, tuple[str, tuple[Path, ...]]] = {
     "compare.js": ("text/javascript", (_FOLDER / "compare.js",)),
     "htmx.min.js": ("text/javascript", (_FOLDER / "htmx.min.js",)),
     "htmx.LICENSE.txt": ("text/plain", (_FOLDER / "htmx.LICENSE.txt",)),
+    "idiomorph-ext.min.js": ("text/javascript", (_FOLDER / "idiomorph-ext.min.js",)),
+    "idiomorph.LICENSE.txt": ("text/plain", (_FOLDER / "idiomorph.LICENSE.txt",)),
     "icon.svg": ("image/svg+xml", (_FOLDER / "icon.svg",)),
 }
 """Name -> media type, and the files that it is made of."""
@@ -51,7 +56,7 @@ def address(name: str) -> str:
 @router.get("/{digest}/{name}", response_class=Response)
 def read_asset(
     digest: Annotated[str, InPath(pattern=r"^[0-9a-f]{16}$")],
-    name: Annotated[str, InPath(pattern=r"^[A-Za-z.]{1,40}$")],
+    name: Annotated[str, InPath(pattern=r"^[A-Za-z.-]{1,40}$")],
     request: Request,
 ) -> Response:
     """A file; what has an address never changes."""

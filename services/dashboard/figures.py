@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import sqlalchemy as sa
 
+from schemas.job import FINAL_STATES, JobKind, JobSpec, JobState
 from schemas.service import ExecutorRecord, QueueRecord
 from services.clock import iso
 from services.database import Database
@@ -27,6 +28,18 @@ class Champion:
     score: float | None
     since: str | None
     why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """A job that has ended, as far as a line tells of it."""
+
+    id: str
+    kind: JobKind
+    name: str | None
+    spec: JobSpec
+    state: JobState
+    finished: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,6 +124,26 @@ def champions(database: Database, limit: int, names: Sequence[str] | None = None
             Champion(row.name, row.version, row.score, iso(row.at) if row.at is not None else None, row.why or "")
             for row in connection.execute(query)
         ]
+
+
+def under_way(database: Database) -> Counter[str]:
+    """How many jobs there are in each state that is not final."""
+    query = sa.select(jobs.c.state, sa.func.count().label("number")).where(jobs.c.state.not_in(FINAL_STATES))
+    with database.read() as connection:
+        return Counter({row.state: row.number for row in connection.execute(query.group_by(jobs.c.state))})
+
+
+def lately_ended(database: Database, limit: int) -> list[Ended]:
+    """The jobs that ended last, whenever they were submitted."""
+    columns = jobs.c.id, jobs.c.kind, jobs.c.name, jobs.c.spec, jobs.c.state, jobs.c.finished
+    ended = jobs.c.state.in_(FINAL_STATES) & jobs.c.finished.is_not(None)
+    latest = jobs.c.finished.desc(), jobs.c.id.desc()
+    with database.read() as connection:
+        rows = connection.execute(sa.select(*columns).where(ended).order_by(*latest).limit(limit)).all()
+    return [
+        Ended(row.id, row.kind, row.name, JobSpec.model_validate(row.spec), row.state, iso(row.finished))
+        for row in rows
+    ]
 
 
 def role_loads(queues: Sequence[QueueRecord], executors: Sequence[ExecutorRecord]) -> list[RoleLoad]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal, NamedTuple, get_args
 
 from anyio import to_thread
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
@@ -21,11 +21,13 @@ from services.dashboard.stages import graph
 from services.dashboard.visitor import FormBody, NoFields
 from services.database import tables
 from services.problems import Refusal
+from services.service import Service
 
 router = APIRouter(prefix="/jobs", route_class=PageRoute, include_in_schema=False)
 _submit = [Depends(Needs("submit"))]
 
 _LOG_EVENTS = 200
+_SHOWN_APART = {"kind", "name", "scenes", "priority", "width", "height", "budgets", "tail"}
 # A form sends what is not filled in as an empty text.
 _Name = Annotated[str, Query(pattern=r"^(?:[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?)?$")]
 _Button = Annotated[NoFields, Depends(FormBody(NoFields))]
@@ -35,6 +37,15 @@ _REPORT_POLICY = (
     "sandbox allow-scripts; default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
+
+
+class Line(NamedTuple):
+    """An event of a job's log: its number, when it was (UTC), of which kind it is, and what it tells."""
+
+    number: int
+    at: str
+    kind: str
+    what: str
 
 
 @router.get("", response_class=Response)
@@ -70,8 +81,9 @@ def show_job(
     paging: Page,
     stage: Annotated[str, Query(pattern=r"^[a-z]{0,32}$")] = "",
     state: TaskState | Literal[""] = "",
+    until: Annotated[int | None, Query(ge=1, le=2**31 - 1)] = None,
 ) -> Response:
-    """A job; the query chooses among its tasks."""
+    """A job; the query chooses among its tasks, and until which event its log goes."""
     last, final = request.app.state.feeds.state(job_id) or (0, True)
     job = service.jobs.get(job_id)
     positioned = service.jobs.positioned_tasks(
@@ -83,11 +95,13 @@ def show_job(
         "job",
         job=job,
         nodes=graph(job),
+        settings=job.spec.model_dump(mode="json", exclude=_SHOWN_APART, exclude_defaults=True),
         tasks=[task for _, task in tasks],
         paging=paging,
         chosen={"stage": stage, "state": state},
         states=get_args(TaskState),
-        log=[_line(event) for event in service.jobs.events(job_id, max(0, last - _LOG_EVENTS), _LOG_EVENTS)][::-1],
+        log=_log(service, job_id, min(until or last, last)),
+        until=until,
         last=last,
         is_live=not final,
         key_names=service.keys.names({job.submitted_by}),
@@ -138,11 +152,16 @@ def retry_job(job_id: JobId, service: Services, _: _Button) -> Response:
     return redirect(f"/jobs/{service.jobs.retry(job_id).id}")
 
 
-def _line(event: EventRecord) -> tuple[str, str, str]:
-    """Time of day, kind, and what is told of an event."""
+def _log(service: Service, job_id: str, until: int) -> list[Line]:
+    """The events up to a number, latest first."""
+    first = max(0, until - _LOG_EVENTS)
+    return [_line(event) for event in service.jobs.events(job_id, first, until - first)][::-1]
+
+
+def _line(event: EventRecord) -> Line:
     data = event.data
     where = " ".join(str(data[key]) for key in ("stage", "name") if data.get(key))
     problem = data.get("problem") or {}
     said = [data.get("text") or data.get("state") or "", problem.get("detail") or ""]
     what = ": ".join(part for part in (where, *map(str, said)) if part)
-    return event.at[11:19], event.kind, what
+    return Line(event.number, f"{event.at[5:10]} {event.at[11:19]}", event.kind, what)

@@ -7,7 +7,6 @@ import hashlib
 import threading
 import time
 from collections.abc import AsyncIterator
-from contextlib import suppress
 
 import sqlalchemy as sa
 import structlog
@@ -97,13 +96,15 @@ class Watch:
 
 
 async def while_signed_in(request: Request, source: AsyncIterator[bytes]) -> AsyncIterator[bytes]:
-    """A stream that ends soon after its session."""
+    """A stream that ends soon after its session, or where nobody can tell of it: then the page asks, and says why."""
     sessions: Sessions = request.app.state.sessions
     token, checked = request.cookies[COOKIE], time.monotonic()
     async for piece in source:
         if time.monotonic() - checked >= HEARTBEAT_SECONDS:
             checked = time.monotonic()
-            with suppress(SQLAlchemyError):  # the database is away: nobody can tell
+            try:
                 if await to_thread.run_sync(sessions.find, token) is None:
                     return
+            except SQLAlchemyError:
+                return
         yield piece

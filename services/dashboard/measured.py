@@ -63,7 +63,8 @@ class Comparison:
 
     Attributes:
         rows: A row for each technique and budget.
-        best: Technique with the least error within a budget, of those that a renderer can run.
+        best: Technique with the least error within a budget, of those that a renderer can run, over the views that
+            all of these have; budgets without such views are left out.
         front: Technique and budget of the rows that no other beats in time and error.
         legend: Of the charts.
         time: Time against error.
@@ -149,20 +150,31 @@ def compare(measurements: Sequence[Measurement], label: str) -> Comparison:
     """
     rows = summary.rows(measurements)
     runnable = [row for row in rows if row.technique != summary.ORACLE and row.mse is not None]
-    best = {
-        budget: min((row for row in runnable if row.budget_factor == budget), key=lambda row: row.mse or 0.0).technique
-        for budget in {row.budget_factor for row in runnable}
-    }
     points = {(row.technique, row.budget_factor): (row.ms, row.mse) for row in runnable if row.ms and row.mse}
     front = set(charts.pareto_front(list(points.values())))
     return Comparison(
         rows=rows,
-        best=best,
+        best=_best(measurements),
         front=frozenset(key for key, point in points.items() if point in front),
         legend=Markup(charts.legend([row.technique for row in rows if row.mse is not None])),
         time=Markup(charts.error_chart(rows, label)),
         memory=Markup(charts.error_chart(rows, label, charts.MEMORY)),
     )
+
+
+def _best(measurements: Sequence[Measurement]) -> dict[float, str]:
+    errors: dict[float, dict[str, dict[tuple[str, str], float]]] = {}
+    for m in summary.compared(measurements):
+        if m.technique not in (summary.ORACLE, summary.EXACT):
+            mine = errors.setdefault(m.budget_factor, {}).setdefault(m.technique, {})
+            mine[m.scene, m.view] = max(m.mse or 0.0, summary.MSE_FLOOR)
+    best = {}
+    for budget, techniques in errors.items():
+        shared = set.intersection(*map(set, techniques.values()))
+        means = {name: summary.geometric_mean([found[view] for view in shared]) for name, found in techniques.items()}
+        if shared:
+            best[budget] = min(means, key=lambda name: means[name] or 0.0)
+    return best
 
 
 def _latest(condition: sa.ColumnElement[bool]) -> sa.Select[Any]:

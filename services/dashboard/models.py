@@ -85,7 +85,7 @@ def show_model(
     recent = [publication.version for publication in published[-_VERSIONS_COMPARED:]]
     scenes = measured.history(service.database, name, recent)
     own = measured.of_version(service.database, reference)
-    moves = registry.moves(name)[::-1][:_MOVES]
+    moves = registry.moves(name)[::-1]
     manifest = registry.manifest(chosen)
     return render(
         request,
@@ -101,8 +101,9 @@ def show_model(
         paging=paging,
         aliases=aliases,
         aliases_offered=sorted({CHAMPION, CANDIDATE, *aliases}),
-        moves=moves,
-        key_names=service.keys.names({move.who for move in moves}),
+        moves=moves[:_MOVES],
+        move_count=len(moves),
+        key_names=service.keys.names({move.who for move in moves[:_MOVES]}),
         recent=recent,
         scenes=scenes,
         history=measured.history_chart(scenes, recent),

@@ -6,10 +6,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
-from schemas.job import FINAL_STATES
 from services.api.parts import Services
 from services.api.streams import EventStream
-from services.dashboard.figures import champions, role_loads, savings
+from services.dashboard.figures import champions, lately_ended, role_loads, savings, under_way
 from services.dashboard.live import Watch, while_signed_in
 from services.dashboard.page import PageRoute, render
 
@@ -28,14 +27,16 @@ def show_overview(request: Request, service: Services) -> Response:
     seen = watch.look()  # before the rest is: what changes meanwhile is told
     jobs = service.jobs
     running = [*jobs.list(state="running", limit=_RUNNING), *jobs.list(state="cancelling", limit=_RUNNING)]
-    ended = [job for job in jobs.list(limit=_ENDED + _RUNNING) if job.state in FINAL_STATES]
+    counts = under_way(service.database)
     return render(
         request,
         "overview",
         seen=seen,
         running=running,
+        running_count=counts["running"] + counts["cancelling"],
         waiting=jobs.list(state="queued", limit=_WAITING),
-        ended=ended[:_ENDED],
+        waiting_count=counts["queued"],
+        ended=lately_ended(service.database, _ENDED),
         roles=role_loads(jobs.queues(), jobs.executors()),
         champions=champions(service.database, _CHAMPIONS),
         saved=savings(service.database),

@@ -43,7 +43,7 @@ PAGES = (
 )
 """What the navigation leads to."""
 
-_LOCAL = re.compile(r"/(?![/\\])[\x21-\x5b\x5d-\x7e]*")
+_LOCAL = re.compile(r"/(?![/\\])[\x21-\x5b\x5d-\x7e]{0,1999}")  # no longer than what `/sign-in` takes
 _UNITS = ((86400.0, "d"), (3600.0, "h"), (60.0, "min"), (1.0, "s"))
 
 _AGAIN = frozenset({429, 500, 503})
@@ -146,19 +146,25 @@ def _problem_page(request: Request, error: Exception) -> Response:
 
 
 def _to_sign_in(request: Request) -> Response:
-    asked = _asked(request)
+    is_part = request.headers.get("hx-request") == "true"
+    asked = _shown(request) if is_part else _asked(request)
     to = "/sign-in"
-    if request.headers.get("hx-request") == "true":  # a part of a page: the whole page has to go
-        return Response(status_code=401, headers={**HEADERS, "HX-Redirect": to})
     if request.method == "GET" and asked != "/" and is_local(asked):
         to += f"?next={quote(asked, safe='')}"
-    return redirect(to)
+    # With a part of a page the whole page has to go.
+    return Response(status_code=401, headers={**HEADERS, "HX-Redirect": to}) if is_part else redirect(to)
 
 
 def _asked(request: Request) -> str:
     """Path and query of a request; not from its `url`, which the header `Host` is a part of."""
     query = request.scope["query_string"].decode("latin-1")
     return quote(request.scope["path"], safe="/:@!$&'()*+,;=~") + (f"?{query}" if query else "")
+
+
+def _shown(request: Request) -> str:
+    """Path and query of the page that a script asks for a part of."""
+    page = request.headers.get("hx-current-url", "").partition("://")[2].partition("#")[0]
+    return f"/{page.partition('/')[2]}"
 
 
 @cache

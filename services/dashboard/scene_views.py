@@ -154,18 +154,29 @@ def views(database: Database, digest: str) -> list[SeenView]:
         database: Where measurements are.
         digest: Of the scene's content.
     """
-    query = sa.select(table.c.artifact, table.c.model, table.c.data).where(table.c.scene_digest == digest)
-    with database.read() as connection:
-        rows = connection.execute(query.order_by(table.c.id.desc()).limit(_MOST_ROWS)).all()
     found: dict[str, dict[tuple[str, float], Shot]] = {}
     setting: dict[str, Setting] = {}
-    for row in rows:
-        shot = Shot(row.artifact, row.model, Measurement.model_validate(row.data))
-        m = shot.measured
-        key = setting_of(row.data)
-        if setting.setdefault(m.view, key) == key:
-            found.setdefault(m.view, {}).setdefault((m.technique, m.budget_factor), shot)
+    for row in newest(database, table.c.scene_digest == digest, _MOST_ROWS):
+        view, key, own = row.data["view"], (row.data["technique"], row.data["budget_factor"]), setting_of(row.data)
+        if setting.setdefault(view, own) == own and key not in found.setdefault(view, {}):
+            found[view][key] = Shot(row.artifact, row.model, Measurement.model_validate(row.data))
     return [_view(name, list(found[name].values())) for name in sorted(found)]
+
+
+def newest(database: Database, where: sa.ColumnElement[bool], limit: int) -> list[Any]:
+    """Rows with `artifact`, `model` and `data`, the last that were measured first.
+
+    Args:
+        database: Where measurements are.
+        where: Which.
+        limit: How many at most of models, and how many of techniques without one: those are measured once, and would
+            be lost behind many versions.
+    """
+    query = sa.select(table.c.id, table.c.artifact, table.c.model, table.c.data).order_by(table.c.id.desc())
+    kinds = table.c.model.is_(None), table.c.model.is_not(None)
+    with database.read() as connection:
+        rows = [row for kind in kinds for row in connection.execute(query.where(where, kind).limit(limit))]
+    return sorted(rows, key=lambda row: -row.id)
 
 
 def certificates(store: Store, view: SeenView) -> list[Certificate]:

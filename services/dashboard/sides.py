@@ -11,7 +11,7 @@ import sqlalchemy as sa
 
 from schemas.measurement import Measurement
 from services import summary
-from services.dashboard.scene_views import Shot, setting_of
+from services.dashboard.scene_views import Shot, newest, setting_of
 from services.database import Database
 from services.database.tables import measurements as table
 from services.database.tables import scenes
@@ -19,7 +19,7 @@ from services.problems import Refusal
 from services.stages.pictures import EXACT
 
 _MOST_ROWS = 2_000
-_MOST_SCENES = 50
+_MOST_SCENES = 500
 _EXACT = "exact"
 
 
@@ -142,9 +142,7 @@ def place(database: Database, digest: str, view: str) -> Place:
         Refusal: Nothing was measured there.
     """
     mine = (table.c.scene_digest == digest) & (table.c.view == view)
-    query = sa.select(table.c.artifact, table.c.model, table.c.data).where(mine)
-    with database.read() as connection:
-        rows = connection.execute(query.order_by(table.c.id.desc()).limit(_MOST_ROWS)).all()
+    rows = newest(database, mine, _MOST_ROWS)
     if not rows:
         raise Refusal(
             "not-found",

@@ -18,5 +18,5 @@ def sign_out(request: Request, _: Annotated[NoFields, Depends(FormBody(NoFields)
     """Ends the session, here and in the database."""
     request.app.state.sessions.close(request.cookies[COOKIE])
     response = redirect("/sign-in")
-    response.delete_cookie(COOKIE, path="/", httponly=True, samesite="strict")
+    response.delete_cookie(COOKIE, path="/", httponly=True, samesite="lax")
     return response

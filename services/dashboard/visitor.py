@@ -112,7 +112,7 @@ def set_cookie(request: Request, response: Response, token: str) -> None:
         # Behind a proxy that ends TLS, the origin of the form is what tells.
         secure="https" in (request.url.scheme, urlsplit(request.headers.get("origin", "")).scheme),
         httponly=True,
-        samesite="strict",
+        samesite="lax",  # a link that somebody shared leads to its page; forms have a token and their origin
     )
 
 

@@ -25,6 +25,7 @@ from renderer.dump_pixels import DumpReader
 from renderer.exr import read_exr
 from schemas.colour import display8
 from schemas.problem import ExitCode, Problem
+from services.dashboard import scene_views, sides
 from services.dashboard.compare import Comparer
 from services.dashboard.measured import history, of_version
 from services.dashboard.pixels import RULE_TITLES
@@ -264,6 +265,19 @@ def test_nothing_measured_says_what_to_do(tmp_path: Path) -> None:
     assert "diaphane jobs submit evaluate" in answer.text
     scene = empty.scene()
     assert Visitor(empty, "read").get(f"/compare?scene={scene}").status_code == 404
+
+
+def test_many_versions_leave_room_for_what_they_are_compared_with(
+    api: Api, reader: Visitor, filled: Filled, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Techniques without a model are measured once, before all versions."""
+    digest = api.service.scenes.get(filled.scene).digest
+    shown = {one.name: len(one.shots) for one in views(api.service.database, digest)}
+    monkeypatch.setattr(scene_views, "_MOST_ROWS", 16)
+    monkeypatch.setattr(sides, "_MOST_ROWS", 8)
+    assert {one.name: len(one.shots) for one in views(api.service.database, digest)} == shown
+    page = reader.get(f"/compare?{_query(filled)}").text
+    assert [f'value="{name}:{factor:g}"' in page for name in RULES for factor in FACTORS] == [True] * 6
 
 
 _MOVED = CAMERA.model_copy(update={"eye": (0.0, 1.0, 3.0), "fov": 30.0})

@@ -88,6 +88,7 @@ def test_the_pixel_goes_by_keyboard_and_into_the_address(tab: Tab, filled: Fille
     tab.page.keyboard.press("Shift+ArrowUp")
     _shows(tab, 25, 6)
     assert (tab.address()["x"], tab.address()["y"]) == ("25", "6")
+    tab.until("document.querySelectorAll('#inspector .mark[tabindex=\"0\"]').length === 1")  # the chart is a stop, too
     assert "Pixel 25, 6" in tab.page.get_by_role("status").inner_text()
     tab.page.get_by_label("Pixel x").fill("3")
     tab.page.keyboard.press("Enter")
@@ -145,6 +146,9 @@ def test_state_survives_a_reload_and_goes_back_and_forth(tab: Tab, filled: Fille
 
 def test_another_side_is_another_page_and_what_was_in_focus_stays_so(tab: Tab, filled: Filled) -> None:
     _open(tab, filled, "&mode=difference&x=5&y=6")
+    tab.page.get_by_label("Differences").select_option("64")
+    shown = tab.page.locator("#picture-map").get_attribute("src")
+    assert tab.page.get_by_role("link", name="difference as PNG").get_attribute("href") == shown
     tab.page.get_by_label("A", exact=True).focus()
     tab.page.get_by_label("A", exact=True).select_option("exact")
     tab.page.wait_for_url("**a=exact*")

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 import io
 import re
 import time
+from collections.abc import AsyncIterator
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import sqlalchemy as sa
@@ -19,7 +23,7 @@ from support.dashboard import HOSTILE, ORIGIN, Shown, Visitor, fill
 from support.postgres import Postgres
 
 from services.api.routes import GUARDED, OPEN, routes
-from services.dashboard import OPEN_PAGES, PAGES, SESSION_ANSWERS, assets
+from services.dashboard import OPEN_PAGES, PAGES, SESSION_ANSWERS, assets, live, models
 from services.dashboard.page import duration, is_local
 from services.dashboard.sessions import form_token
 from services.database import Database, tables
@@ -81,9 +85,27 @@ def test_where_one_wanted_to_go_is_kept(api: Api, shown: Shown) -> None:
         assert not is_local(elsewhere)
 
 
-def test_a_part_of_a_page_sends_the_whole_page_to_sign_in(api: Api) -> None:
-    answer = Visitor(api, None).get("/jobs", **{"HX-Request": "true"})
-    assert (answer.status_code, answer.headers["hx-redirect"]) == (401, "/sign-in")
+@pytest.mark.parametrize(
+    ("page", "to"),
+    [
+        ("", ""),
+        ("http://localhost/", ""),
+        ("http://localhost/jobs/x?stage=label#log", "?next=%2Fjobs%2Fx%3Fstage%3Dlabel"),
+        ("http://x//evil.example/", ""),
+        ("http://[", ""),
+    ],
+)
+def test_a_part_of_a_page_sends_the_whole_page_to_sign_in_and_back(empty: Api, page: str, to: str) -> None:
+    answer = Visitor(empty, None).get("/jobs", **{"HX-Request": "true", "HX-Current-URL": page})
+    assert (answer.status_code, answer.headers["hx-redirect"]) == (401, f"/sign-in{to}")
+
+
+def test_an_address_too_long_to_come_back_to_leads_to_sign_in_all_the_same(empty: Api) -> None:
+    nobody = Visitor(empty, None)
+    for extra, is_kept in ((1980, True), (1990, False)):
+        to = nobody.get("/compare?view=" + "x" * extra).headers["location"]
+        assert ("next=" in to) == is_kept
+        assert nobody.get(to).status_code == 200
 
 
 def test_a_session_is_a_secret_of_the_browser(api: Api) -> None:
@@ -91,7 +113,7 @@ def test_a_session_is_a_secret_of_the_browser(api: Api) -> None:
     cookie = visitor.sign_in(api.secrets["read"]).headers["set-cookie"]
     token = re.match(r"diaphane_session=([A-Za-z0-9_-]{43});", cookie)
     assert token is not None
-    assert {"HttpOnly", "SameSite=strict", "Path=/", "Max-Age=43200"} <= set(cookie.split("; "))
+    assert {"HttpOnly", "SameSite=lax", "Path=/", "Max-Age=43200"} <= set(cookie.split("; "))
     assert "Secure" not in cookie
     answer = visitor.client.post(
         "/sign-in", data={"key": api.secrets["read"]}, headers={"Origin": "https://localhost", "Host": "localhost"}
@@ -267,6 +289,75 @@ def test_pages_with_data(admin: Visitor, shown: Shown) -> None:
     assert "Pack the file." in text[f"/scenes/{shown.rejected}"]
 
 
+def test_the_overview_counts_all_jobs_and_shows_those_that_ended_last(tmp_path: Path) -> None:
+    """However many wait: a job may have been submitted before all of them, and have ended just now."""
+    api = Api(tmp_path)
+    first = api.job(name="glass")
+    with api.service.database.write() as connection:
+        row = dict(connection.execute(sa.select(tables.jobs)).mappings().one())
+        others = [row | {"id": f"job_{n:024x}", "name": f"m-{n}", "created": row["created"] + n} for n in range(1, 61)]
+        for n in (3, 4, 5, 6, 7, 8):  # and six that were submitted later, and ended before
+            others[n] |= {"state": "succeeded", "finished": row["created"] + n}
+        for n in range(30, 55):
+            others[n] |= {"state": "running", "started": row["created"]}
+        connection.execute(tables.jobs.insert(), others)
+        ended = tables.jobs.update().where(tables.jobs.c.id == first)
+        connection.execute(ended.values(state="failed", finished=row["created"] + 99.0))
+    page = Visitor(api, "read").get("/").text
+    lines = re.findall(r'<li id="ended-[^"]+"><span[^>]*>(\w+)</span> <a[^>]*>build ([\w-]+)', page)
+    assert lines == [("failed", "glass"), *(("succeeded", f"m-{n}") for n in (9, 8, 7, 6, 5))]
+    assert 'data-say="25 jobs running, 29 waiting"' in page
+    assert 'The latest of 25. <a href="/jobs?state=running">' in page
+    assert 'The latest of 29. <a href="/jobs?state=queued">' in page
+
+
+def test_a_job_says_what_it_was_asked_for_and_what_came_of_it(tmp_path: Path) -> None:
+    api = Api(tmp_path)
+    api.version(tmp_path / "bundle")
+    asked = {"kind": "evaluate", "name": None, "model": "glass@1.0.0", "alpha": 0.25, "replay": False}
+    evaluate, render = api.job(**asked), api.job(kind="render")
+    views = [{"scene": HOSTILE, "view": "front", "fragments": n, "artifact": "x"} for n in (1000, 234)]
+    per_scene = {HOSTILE: {"score": 0.5, "rival": 0.625}}
+    with api.service.database.write() as connection:
+        for job, result in ((evaluate, {"per_scene": per_scene}), (render, {"views": views})):
+            connection.execute(tables.jobs.update().where(tables.jobs.c.id == job).values(result=result))
+    visitor = Visitor(api, "read")
+    page = visitor.get(f"/jobs/{evaluate}").text
+    for said in ("<h1>evaluate glass@1.0.0</h1>", "<dt>Alpha</dt><dd>0.25</dd>", "<dt>Replay</dt><dd>no</dd>"):
+        assert said in page
+    assert "<dd>0.500 against 0.625 of the champion before</dd>" in page
+    assert "<dt>Seed</dt>" not in page  # as it is by default
+    assert "<script>" not in page
+    assert "<dt>Views</dt><dd>2 with 1 234 fragments</dd>" in visitor.get(f"/jobs/{render}").text
+    assert ">evaluate glass@1.0.0</a>" in visitor.get("/jobs").text
+
+
+def test_the_log_of_a_job_can_be_read_to_its_beginning(tmp_path: Path) -> None:
+    api = Api(tmp_path)
+    job = api.job()
+    api.log(job, *(f"line {n}" for n in range(450)))
+    visitor, seen, path = Visitor(api, "read"), list[str](), f"/jobs/{job}"
+    while path:
+        page = visitor.get(path).text
+        seen += re.findall(r"line \d+", page)
+        assert ("Latest events" in page) == ("until" in path)
+        earlier = re.search(r'href="([^"#]+)#log">Earlier events', page)
+        path = earlier[1] if earlier else ""
+    assert seen == [f"line {n}" for n in reversed(range(450))]
+    assert visitor.get(f"/jobs/{job}?until=0").status_code == 422
+    assert "line 449" in visitor.get(f"/jobs/{job}?until=999999").text
+
+
+def test_a_model_says_how_much_of_its_past_is_shown(
+    admin: Visitor, shown: Shown, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = ("The last 2 of 3 versions.", "The last 2 of 3 moves.")
+    assert not any(one in admin.get("/models/glass").text for one in said)
+    monkeypatch.setattr(models, "_VERSIONS_COMPARED", 2)
+    monkeypatch.setattr(models, "_MOVES", 2)
+    assert all(one in admin.get("/models/glass").text for one in said)
+
+
 def test_names_are_text_and_never_markup(admin: Visitor, shown: Shown) -> None:
     for path in (*_pages(shown), "/jobs?name=glass", f"/scenes/{shown.scene}?view=%3Cscript%3E"):
         page = admin.get(path).text
@@ -430,8 +521,9 @@ def test_pages_are_made_for_every_reader(admin: Visitor, shown: Shown) -> None:
         assert 'class="skip" href="#main"' in page
         assert not re.search(r"<th(?![^>]*scope=)[ >]", page)
         assert not re.search(r"<img(?![^>]* alt=)", page)
-        ids = re.findall(r'\sid="([^"]+)"', page)
+        ids = re.findall(r'\sid="([^"]*)"', page)
         assert len(ids) == len(set(ids))
+        assert all(re.fullmatch(r"\S+", one) for one in ids)
         assert set(re.findall(r'aria-labelledby="([^"]+)"', page)) <= set(ids)
         assert set(re.findall(r'<label for="([^"]+)"', page)) <= set(ids)
         levels = [int(level) for level in re.findall(r"<h([1-6])", page)]
@@ -443,9 +535,9 @@ def test_static_files_are_for_ever(empty: Api) -> None:
     page = nobody.get("/sign-in").text
     addresses = set(re.findall(r'"(/static/[^"]+)"', page))
     assert {address.rpartition("/")[2] for address in addresses} == {
-        *("dashboard.css", "dashboard.js", "htmx.min.js", "icon.svg")
+        *("dashboard.css", "dashboard.js", "htmx.min.js", "icon.svg", "idiomorph-ext.min.js")
     }
-    for address in (*addresses, assets.address("htmx.LICENSE.txt")):
+    for address in (*addresses, *map(assets.address, ("htmx.LICENSE.txt", "idiomorph.LICENSE.txt"))):
         answer = nobody.get(address)
         assert (answer.status_code, answer.headers["cache-control"]) == (200, "public, max-age=31536000, immutable")
         assert nobody.get(address, **{"If-None-Match": answer.headers["etag"]}).status_code == 304
@@ -453,9 +545,12 @@ def test_static_files_are_for_ever(empty: Api) -> None:
     assert nobody.get(assets.address("htmx.min.js").replace("htmx.min.js", "..%2Fpage.py")).status_code == 404
 
 
-def test_htmx_is_the_version_that_is_said_and_may_be_passed_on() -> None:
+def test_vendored_scripts_are_the_versions_that_are_said_and_may_be_passed_on() -> None:
     assert f'version:"{assets.HTMX}"'.encode() in assets.content("htmx.min.js")[0]
-    assert assets.content("htmx.LICENSE.txt")[0].startswith(b"Zero-Clause BSD")
+    released = {"0.8.0": "5811b9a7eda14878b7dab4378bf60432e1bb6f11fcfb970cc26540642650181e"}  # it does not say its own
+    assert assets.content("idiomorph-ext.min.js")[1] == released[assets.IDIOMORPH]
+    for name in ("htmx", "idiomorph"):
+        assert assets.content(f"{name}.LICENSE.txt")[0].startswith(b"Zero-Clause BSD")
 
 
 def test_secrets_of_browsers_are_not_logged(empty: Api) -> None:
@@ -534,6 +629,30 @@ def test_streams_tell_of_changes(api: Api, shown: Shown) -> None:
     before = watch._look()
     api.log(shown.running, "news")
     assert watch._look() != before
+
+
+def test_a_stream_ends_where_nobody_can_tell_of_its_session(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Then the page asks by itself, and says that the database is away."""
+
+    def fail(_: str) -> None:
+        raise OperationalError("select", {}, Exception("gone"))
+
+    async def source() -> AsyncIterator[bytes]:
+        while True:
+            yield b"still here"
+
+    async def heard(find: Any) -> int:
+        state = SimpleNamespace(sessions=SimpleNamespace(find=find))
+        request: Any = SimpleNamespace(app=SimpleNamespace(state=state), cookies={"diaphane_session": "x"})
+        number = 0
+        async for _ in live.while_signed_in(request, source()):
+            number += 1
+            if number == 3:
+                break
+        return number
+
+    monkeypatch.setattr(live, "HEARTBEAT_SECONDS", 0.0)
+    assert [asyncio.run(heard(find)) for find in (lambda _: "a key", lambda _: None, fail)] == [3, 0, 0]
 
 
 def test_durations_and_addresses() -> None:

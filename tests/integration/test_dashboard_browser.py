@@ -37,6 +37,15 @@ def empty_tab(request: pytest.FixtureRequest, chromium: Any, empty: Api) -> Iter
         opened.context.close()
 
 
+_OUTLINES = """async () => {
+  const fresh = new DOMParser().parseFromString(await (await fetch(location.href)).text(), "text/html");
+  const [here, there] = [document, fresh].map((page) =>
+    [...page.querySelectorAll("#main *")].map((one) => `${one.nodeName} ${one.id}`));
+  return [here.length > 99, here.join() === there.join()];
+}"""
+"""Whether a page has much in it, and is made of the same elements as one that comes now."""
+
+
 def _pages(shown: Shown) -> dict[str, str]:
     return {
         "overview": "/",
@@ -105,7 +114,7 @@ def test_a_live_page_outlives_a_failing_database(
     tab.page.goto(f"/jobs/{shown.running}")
     with monkeypatch.context() as broken:
         broken.setattr(Database, "read", _fail)
-        tab.page.evaluate("htmx.trigger(document.getElementById('job'), 'refresh')")
+        tab.page.evaluate("htmx.trigger('[data-stream]', 'refresh')")
         tab.page.get_by_role("alert").wait_for()
         assert "the service answered 503" in tab.page.get_by_role("alert").inner_text()
         assert tab.page.get_by_role("heading", name="Stages").is_visible()
@@ -114,6 +123,69 @@ def test_a_live_page_outlives_a_failing_database(
     tab.page.get_by_text(text).wait_for()
     tab.page.get_by_role("alert").wait_for(state="hidden")
     assert _only_status(tab, 503)
+
+
+def test_a_live_page_without_its_stream_goes_along_and_says_when_it_cannot(
+    chromium: Any, api: Api, url: str, shown: Shown
+) -> None:
+    tab = Tab(chromium, url, 1280, "light")
+    tab.sign_in(api.secrets["read"])
+    tab.page.add_init_script("const wait = setTimeout; window.setTimeout = (what, ms) => wait(what, ms / 20);")
+    tab.page.route("**/events?*", lambda route: route.fulfill(status=503))
+    tab.page.goto(f"/jobs/{shown.running}")
+    _go_on(api, shown.running, "label", "without a stream")
+    tab.page.get_by_text("without a stream").wait_for()
+    alert, page = tab.page.get_by_role("alert"), f"**/jobs/{shown.running}"
+    assert not alert.is_visible()
+    tab.page.route(page, lambda route: route.abort())
+    alert.wait_for()
+    assert "cannot be reached" in alert.inner_text()
+    tab.page.unroute(page)
+    alert.wait_for(state="hidden")
+    tab.context.close()
+
+
+def test_a_part_that_comes_anew_keeps_what_is_the_same(tab: Tab, api: Api, shown: Shown) -> None:
+    """The focus, what is selected, and how far a table is scrolled; no row is lost or there twice."""
+    tab.page.goto("/")
+    is_narrow = tab.page.viewport_size["width"] < 1000
+    tab.page.evaluate(
+        f"() => {{ window.link = document.querySelector('#now a[href=\"/jobs/{shown.running}\"]');"
+        " [window.jobs, window.workers] = document.querySelectorAll('#now .scroll');"
+        " getSelection().selectAllChildren(link); jobs.scrollLeft = 40; }"
+    )
+    kept = "[getSelection().toString(), link.pathname, link.isConnected, jobs.isConnected, jobs.scrollLeft]"
+    as_it_was = tab.page.evaluate(kept)
+    assert as_it_was[1:] == [f"/jobs/{shown.running}", True, True, 40 if is_narrow else 0]
+    tab.until(f"workers.tabIndex === {0 if is_narrow else -1}")  # what scrolls, and has no link in it, is a stop
+    other = api.job(name="came-later")
+    came = tab.page.locator("#now tr").get_by_text("build came-later")
+    for focused in ("link", "workers"):
+        tab.page.evaluate(f"document.activeElement.blur(), {focused}.focus()")
+        before = tab.page.evaluate("window.before = document.activeElement, before.nodeName")
+        assert before == ("A" if focused == "link" else "DIV" if is_narrow else "BODY")
+        for state, seen in (("running", "visible"), ("cancelled", "detached")):
+            api.move(other, state)
+            tab.page.evaluate("htmx.trigger('[data-stream]', 'refresh')")
+            came.wait_for(state=seen)
+            assert tab.page.evaluate("new Promise(requestAnimationFrame).then(() => document.activeElement === before)")
+            assert tab.page.evaluate(kept) == as_it_was
+            assert tab.page.evaluate("workers.getAttribute('role')") == ("region" if is_narrow else None)
+            assert tab.page.evaluate(_OUTLINES) == [True, True]
+    with api.service.database.write() as connection:
+        connection.execute(tables.jobs.delete().where(tables.jobs.c.id == other))
+    assert tab.faults == []
+
+
+def test_a_link_from_elsewhere_finds_who_is_signed_in(chromium: Any, api: Api, url: str, shown: Shown) -> None:
+    tab = Tab(chromium, url, 1280, "light")
+    tab.sign_in(api.secrets["read"])
+    link = f'<a href="{url}/jobs/{shown.built}">look at this</a>'
+    tab.page.route("http://chat.example/", lambda route: route.fulfill(content_type="text/html", body=link))
+    tab.page.goto("http://chat.example/")
+    tab.page.get_by_text("look at this").click()
+    tab.page.get_by_role("heading", name="build glass").wait_for()
+    tab.context.close()
 
 
 def _fail(_: object) -> None:
@@ -129,16 +201,21 @@ def _only_status(tab: Tab, status: int) -> bool:
 
 
 def test_a_running_job_is_shown_as_it_goes(tab: Tab, api: Api, shown: Shown) -> None:
+    _go_on(api, shown.running, "label", "before")
     tab.page.goto(f"/jobs/{shown.running}")
     assert tab.page.get_by_role("status").inner_text() == ""
     loads: list[str] = []
     tab.page.on("framenavigated", lambda frame: loads.append(frame.url))
     text = f"news at {tab.page.viewport_size['width']}"
+    tab.page.evaluate("getSelection().selectAllChildren(document.querySelector('#log-lines tbody tr'))")
+    selected = tab.page.evaluate("getSelection().toString()")
     later = threading.Timer(0.5, _go_on, [api, shown.running, "export", text])
     later.start()
     tab.page.get_by_text(text).wait_for()
     later.join()
     assert tab.page.get_by_role("status").inner_text() == "The job is running, stage export"
+    assert tab.page.evaluate("getSelection().toString()") == selected != ""
+    assert tab.page.evaluate(_OUTLINES) == [True, True]
     assert loads == []
     assert tab.faults == []
 
@@ -186,8 +263,13 @@ def test_values_of_charts_can_be_read_with_the_pointer_and_the_keyboard(tab: Tab
     assert "e-5" in tip.inner_text()
     tab.page.keyboard.press("Escape")
     assert not tip.is_visible()
-    tab.page.locator("svg.chart .mark").nth(1).focus()
+    marks = tab.page.locator("svg.chart").first.locator(".mark")
+    marks.first.focus()
+    for key, place in (("ArrowRight", 1), ("End", marks.count() - 1), ("ArrowDown", marks.count() - 1), ("Home", 0)):
+        tab.page.keyboard.press(key)
+        assert tip.inner_text() == marks.nth(place).get_attribute("aria-label")
     assert "e-5" in tip.inner_text()
+    assert tab.page.locator('svg.chart .mark[tabindex="0"]').count() == tab.page.locator("svg.chart").count()
     box = tip.bounding_box()
     assert box["x"] >= 0
     assert box["x"] + box["width"] <= tab.page.viewport_size["width"]

@@ -13,7 +13,7 @@ from fastapi.testclient import TestClient
 
 from schemas.measurement import Measurement
 from schemas.service import SCOPES, ShardRef
-from services.api import create_app
+from services.api.application import create_app
 from services.api.server import server_of
 from services.database import tables
 from services.engine import events

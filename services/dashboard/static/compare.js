@@ -49,14 +49,18 @@ function compare(form, stage) {
   const divider = Object.assign(document.createElement("div"), { className: "divider", hidden: true });
   box.append(divider);
 
-  function load(key, show, side, text) {
+  function address(show, side) {
     const asked = new URLSearchParams({ scene: field("scene").value, view: field("view").value });
     asked.set("a", field(side).value);
     if (show === "difference" || show === "flip") asked.set("b", field("b").value);
     asked.set("show", show);
     if (show === "difference") asked.set("amplify", field("amplify").value);
     if (show === "k") asked.set("top", stage.dataset.top);
-    const source = `/compare/picture.png?${asked}`;
+    return `/compare/picture.png?${asked}`;
+  }
+
+  function load(key, show, side, text) {
+    const source = address(show, side);
     const image = images.get(key);
     if (image.dataset.source !== source) {
       image.dataset.source = source;
@@ -81,6 +85,7 @@ function compare(form, stage) {
     } else {
       load("map", chosen, "a", `${chosen} of ${title("a")} and ${title("b")}`);
     }
+    at("difference-in-full").href = address("difference", "a");
     stage.dataset.mode = chosen;
     for (const name of ["slider", "blink", "difference", "flip", "k"]) {
       for (const control of document.querySelectorAll(`.for-${name}`)) control.hidden = !chosen.startsWith(name);

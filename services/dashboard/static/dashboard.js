@@ -5,6 +5,11 @@
 const said = document.getElementById("said");
 const trouble = document.getElementById("trouble");
 
+// A part that comes anew is morphed: what is the same stays, and with it the focus, what is selected, and how far a
+// table is scrolled; ids tell rows apart. What a watched box has and a fresh one lacks is this file's (`reach`).
+Idiomorph.defaults.callbacks.beforeAttributeUpdated = (name, box, change) =>
+  change === "update" || box.dataset.watched === undefined;
+
 // A stream tells that something has changed; htmx then fetches that part of the page anew, twice a second at most.
 // A page that is not looked at gives its connection back: a browser has only a few.
 function follow(box) {
@@ -12,11 +17,12 @@ function follow(box) {
   let last = "";
   let due = 0;
   let again = 0;
+  const part = box.firstElementChild;
   const changed = (event) => {
     last = event.lastEventId || last;
     due ||= setTimeout(() => {
       due = 0;
-      htmx.trigger(document.getElementById(box.dataset.part), "refresh");
+      htmx.trigger(box, "refresh");
     }, 500);
   };
   const open = () => {
@@ -24,10 +30,15 @@ function follow(box) {
     if (last) url.searchParams.set("after", last);
     source = new EventSource(url);
     for (const kind of ["change", "state", "stage", "task", "log"]) source.addEventListener(kind, changed);
-    // A browser gives up on a stream that was refused: for good if all has been told, else only for now.
-    source.addEventListener("error", () => {
-      const isLive = document.getElementById(box.dataset.part).dataset.live !== undefined;
-      if (source.readyState === EventSource.CLOSED && isLive) again = setTimeout(open, 5000);
+    // Without a stream the page asks by itself: so it goes along, or says why it cannot. A browser gives up on a stream
+    // that was refused: for good if all has been told, else only for now.
+    source.addEventListener("error", (event) => {
+      if (part.dataset.live === undefined) return;
+      changed(event);
+      if (source.readyState === EventSource.CLOSED) again = setTimeout(open, 5000);
+    });
+    source.addEventListener("open", (event) => {
+      if (!trouble.hidden) changed(event);
     });
   };
   document.addEventListener("visibilitychange", () => {
@@ -85,14 +96,32 @@ for (const kind of ["pointerover", "focusin"]) document.addEventListener(kind, s
 document.addEventListener("keydown", (event) => {
   if (event.key === "Escape") tip.hidden = true;
 });
-for (const chart of document.querySelectorAll("svg.chart")) {
-  chart.setAttribute("role", "group"); // as an image it would hide its marks
-  for (const mark of chart.querySelectorAll(".mark")) {
-    mark.setAttribute("tabindex", "0");
-    mark.setAttribute("role", "img");
-    mark.setAttribute("aria-label", mark.querySelector("title").textContent);
+
+// A chart is one stop of the keyboard, however many values it has; arrows go from one to the next.
+function reachMarks() {
+  for (const chart of document.querySelectorAll('svg.chart[role="img"]')) {
+    chart.setAttribute("role", "group"); // as an image it would hide its marks
+    chart.setAttribute("aria-description", "Arrow keys go from value to value.");
+    chart.querySelectorAll(".mark").forEach((mark, i) => {
+      mark.setAttribute("tabindex", i ? "-1" : "0");
+      mark.setAttribute("role", "img");
+      mark.setAttribute("aria-label", mark.querySelector("title").textContent);
+    });
   }
 }
+document.addEventListener("keydown", (event) => {
+  const mark = event.target.closest?.("svg.chart .mark");
+  if (!mark || event.ctrlKey || event.metaKey || event.altKey) return;
+  const marks = [...mark.closest("svg").querySelectorAll(".mark")];
+  const [at, end] = [marks.indexOf(mark), marks.length - 1];
+  const to = { ArrowRight: at + 1, ArrowDown: at + 1, ArrowLeft: at - 1, ArrowUp: at - 1, Home: 0, End: end }[event.key];
+  if (to === undefined) return;
+  event.preventDefault();
+  const next = marks[Math.min(Math.max(to, 0), end)];
+  mark.setAttribute("tabindex", "-1");
+  next.setAttribute("tabindex", "0");
+  next.focus();
+});
 
 // What scrolls is a stop of the keyboard, if there is none in it; what does not scroll is none.
 const STOPS = "a[href], button, input, select, textarea, summary, [tabindex]";
@@ -116,5 +145,9 @@ function watchScrollers() {
     scrollers.observe(box);
   }
 }
-new MutationObserver(watchScrollers).observe(document.getElementById("main"), { childList: true, subtree: true });
-watchScrollers();
+function reachAll() {
+  watchScrollers();
+  reachMarks();
+}
+new MutationObserver(reachAll).observe(document.getElementById("main"), { childList: true, subtree: true });
+reachAll();

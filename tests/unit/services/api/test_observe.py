@@ -7,7 +7,7 @@ import structlog
 from fastapi.testclient import TestClient
 from support.api import Api, build_spec
 
-from services.api import create_app
+from services.api.application import create_app
 from services.api.server import is_loopback, make_server
 
 
