@@ -52,7 +52,6 @@ class Service:
             "HOME": str(self._folder),
             "TMPDIR": str(self._folder / "tmp"),
             "DIAPHANE_STATE": str(self._folder),
-            "NUMBA_CACHE_DIR": "",  # beside the sources, where other tests have compiled the same
             "PYTHONPATH": str(BLOCKED),
             "BLOCKED_IMPORTS": ",".join(missing_from(image)),
         }
