@@ -29,7 +29,7 @@ from renderer.techniques import Budget, Needs, Technique, technique
 from schemas.bundle import load_manifest
 from schemas.colour import display8
 from schemas.view import View
-from services.bench.flicker import camera_path, error_change
+from services.bench.flicker import camera_path, error_change, k_change
 from services.bench.measure import over
 from services.bench.rounds import shoot
 from services.bench.subject import Subject
@@ -154,7 +154,7 @@ def _changes(views: Sequence[Subject], shots: Sequence[Shot]) -> tuple[float, fl
     for (before, now), (was, here) in zip(pairwise(shots), pairwise(views), strict=True):
         colour.append(error_change(now.image, before.image, here.exact8, was.exact8))
         both = (was.dump.counts > 0) & (here.dump.counts > 0)
-        k.append(float(np.abs(now.k - before.k)[both].mean()))
+        k.append(k_change(now.k, before.k, both))
     return statistics.fmean(colour), statistics.fmean(k)
 
 

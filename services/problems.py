@@ -299,6 +299,12 @@ def without_paths(text: str) -> str:
     return text
 
 
+def summary_of(error: BaseException) -> str:
+    """What an error that nobody expected says in its first line, for users: it names no folder of the service."""
+    first = (str(error).splitlines() or [""])[0]
+    return f"{type(error).__name__}: {without_paths(first)[:200]}"
+
+
 def refusal_of(problem: Problem) -> Refusal:
     """A problem of the other layers as the API's answer: it names no folder of the service."""
     slug = problem.slug if isinstance(problem, RejectedScene) else _OF_CODE.get(problem.code, "internal")

@@ -68,6 +68,12 @@ def error_change(
     return float(np.abs(now - then).mean()) / 255.0
 
 
+def k_change(k: NDArray[np.int32], before: NDArray[np.int32], occupied: NDArray[np.bool_]) -> float:
+    """`mean |k_t - k_{t-1}|` over the pixels that both frames have fragments in, all [P]; 0 without any."""
+    changed = np.abs(k - before)[occupied]
+    return float(changed.mean()) if len(changed) else 0.0
+
+
 def measure_flicker(subject: Subject, runs: Sequence[Run], frames: int) -> Mapping[CellKey, Flicker]:
     """Flicker of every cell along a path through a view.
 
@@ -88,10 +94,9 @@ def measure_flicker(subject: Subject, runs: Sequence[Run], frames: int) -> Mappi
             image = display8(rendered.linear)
             if run.key in last:
                 image_before, k_before = last[run.key]
-                changed = np.abs(rendered.k - k_before)[both]
                 sums[run.key] += (
                     error_change(image, image_before, here.exact8, exact_before),
-                    float(changed.mean()) if len(changed) else 0.0,
+                    k_change(rendered.k, k_before, both),
                 )
             last[run.key] = image, rendered.k
         exact_before, occupied_before = here.exact8, here.dump.counts > 0

@@ -22,7 +22,7 @@ from typing import Any
 from renderer.gate.problems import RejectedScene
 from schemas.problem import Problem
 from services.engine.channel import Channel
-from services.problems import without_paths
+from services.problems import summary_of
 from services.store import MissingArtifact, Store
 from services.tasks import Source, Task
 
@@ -76,8 +76,7 @@ class _Bodies:
             return {"kind": "missing", "artifact": missing.artifact}
         except BaseException as error:
             text = traceback.format_exc()[-_TRACEBACK_CHARACTERS:]
-            summary = without_paths((str(error).splitlines() or [""])[0])[:200]
-            return {"kind": "error", "summary": f"{type(error).__name__}: {summary}", "traceback": text}
+            return {"kind": "error", "summary": summary_of(error), "traceback": text}
         finally:
             with suppress(OSError, ValueError):
                 sys.stdout.flush()

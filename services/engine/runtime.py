@@ -28,7 +28,7 @@ from services.engine.runner import DurableRunner
 from services.engine.states import Abandoned, Cancelled, Claim
 from services.engine.tasks import Place, Tasks
 from services.engine.work import Worker
-from services.problems import document_of, without_paths
+from services.problems import document_of, summary_of
 from services.settings import Settings
 from services.tasks import ROLES, Role
 
@@ -182,9 +182,8 @@ class Runtime:
                     log.warning("the database went away under the job", error=type(error).__name__)
                     raise Abandoned(workflow_id) from None
                 log.exception("the job failed unexpectedly")
-                summary = without_paths((str(error).splitlines() or [""])[0])[:200]
                 unexpected = Problem(
-                    f"Something unexpected happened ({type(error).__name__}: {summary}).",
+                    f"Something unexpected happened ({summary_of(error)}).",
                     "The service's log has the details under the job's id; please report them.",
                     ExitCode.TRY_AGAIN,
                 )

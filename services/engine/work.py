@@ -22,7 +22,7 @@ from services.engine.claims import Claims
 from services.engine.events import Event
 from services.engine.states import Abandoned, Claim
 from services.engine.tasks import Place, Tasks
-from services.problems import document_of, without_paths
+from services.problems import document_of, summary_of
 from services.settings import Settings
 from services.sources import materialise
 from services.store import MissingArtifact
@@ -147,7 +147,7 @@ class Worker:
             self._tasks.fail(claim, place, error.problem, errors, reporter.events(), final=False)
         except Exception as error:  # a full disk, a store that does not answer
             log.exception("task failed", task=title, tries=errors + 1)
-            unexpected = problems.failed(title, _summary(error)).problem
+            unexpected = problems.failed(title, summary_of(error)).problem
             self._tasks.fail(claim, place, unexpected, errors, reporter.events(), final=False)
         else:
             self._tasks.end(claim, place, "done", note, reporter.events())
@@ -209,8 +209,3 @@ class Worker:
         store.push(task.address)
         usage = answer["usage"]
         return f"{usage['cpu_seconds']:.1f} s CPU, {usage['peak_bytes'] / 2**20:.0f} MiB"
-
-
-def _summary(error: Exception) -> str:
-    lines = str(error).splitlines() or [""]
-    return f"{type(error).__name__}: {without_paths(lines[0])[:200]}"

@@ -6,10 +6,10 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 
-from renderer.techniques import TECHNIQUES
 from schemas.bundle import load_manifest
 from services.options import chosen_tail
 from services.progress import Progress
+from services.render_options import EVERY, parse_techniques
 from services.viewer import statistics
 from services.viewer.comparing import Comparer
 from services.viewer.controls import Look, Place
@@ -91,5 +91,5 @@ def _session(options: ViewerOptions, scene: Opened, source: Source) -> Session:
 
 def _place(scene: Opened, source: Source) -> Place:
     arrays = scene.scene.now.scene
-    names = [name for name, entry in TECHNIQUES.items() if source.folder is not None or not entry.needs_bundle]
+    names = parse_techniques([EVERY], source.folder is not None)
     return Place(names, scene.views, arrays.up, arrays.bounds)
