@@ -1,11 +1,11 @@
 """The committed benchmark: every technique on the papers' kind of scenes and the project's own, and a page of it.
 
-python -m benchmarks.suite --bundle FOLDER
+python -m benchmarks.suite
 
-It can be stopped at any time and goes on where it was: what was measured lies in `--work`. `--quick` measures two
-scenes at 320x214 and writes nothing beside `--work`. Without `--bundle`, `kbuffer-deep` is left out. No technique is
-timed for longer than `--limit` seconds a cell beside its warm-up: one that takes longer for a single frame, such as
-depth peeling on a software driver, is timed once, by that frame.
+It can be stopped at any time and goes on where it was: what was measured lies in `--work`, which begins with the
+committed results of this machine and driver; `--fresh` measures all anew. `--quick` measures two scenes at 320x214 and
+writes nothing beside `--work`. No technique is timed for longer than `--limit` seconds a cell beside its warm-up: one
+that takes longer for a single frame, such as depth peeling on a software driver, is timed once, by that frame.
 """
 
 from __future__ import annotations
@@ -16,24 +16,32 @@ import re
 import sys
 import tempfile
 import time
+from collections.abc import Iterable
 from pathlib import Path
 
 from benchmarks.comparing.page import page, pictures
 from benchmarks.comparing.scenes import ALPHAS, SIZES, Part, cases_of, parts_of
 from renderer.context import describe, gl_context
-from schemas.bench import BenchResult
+from renderer.techniques import TECHNIQUES as technique_entries
+from schemas.bench import BenchResult, BenchView
+from services.bench.cells import bundle_of
 from services.bench.files import write_files
-from services.bench.kept import Kept
+from services.bench.kept import ROWS, Kept
 from services.bench.options import BenchOptions, parse_alphas, parse_sizes
 from services.bench.run import bench, result_of
 from services.progress import Progress, make_progress
-from services.render_options import EVERY, parse_techniques
+from services.render_options import parse_techniques
+from services.versions import machine
+from services.writing import replacing
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
 PAGE = ROOT / "benchmarks" / "BENCH.md"
 COMMAND = "make bench"
-TECHNIQUES = [EVERY]
+BUNDLE = ROOT / "benchmarks" / "bundle"
+"""What `benchmarks.comparing.bundle` made: it was trained on none of the suite's scenes."""
+TECHNIQUES = [name for name, entry in technique_entries.items() if entry.settles == 1]
+"""Those that a still frame shows. `kbuffer-temporal` learns from frames: it is measured by `benchmarks.temporal`."""
 _QUICK = {"sizes": ((320, 214),), "alphas": (0.33,), "scenes": ("sponza", "bottles")}
 
 
@@ -42,8 +50,9 @@ def main() -> int:
     arguments = _parse()
     progress = make_progress(sys.stderr)
     work = arguments.work / ("quick" if arguments.quick else label())
+    if not arguments.quick:
+        _begin(work, arguments.fresh)
     left_out: list[str] = []
-    bundle: str | None = None
     with tempfile.TemporaryDirectory(prefix="diaphane-suite-") as folder:
         every = cases_of(arguments.scenes, Path(folder))
         whole = len(list(parts_of(every)))
@@ -51,13 +60,10 @@ def main() -> int:
         parts = list(parts_of(cases, arguments.alphas, arguments.sizes))
         for number, part in enumerate(parts if not arguments.page_only else ()):
             start = time.perf_counter()
-            found = bench(_options(part, arguments, work), COMMAND, progress)
-            left_out, bundle = [*left_out, *found.left_out], found.bundle
+            left_out += bench(_options(part, arguments, work), COMMAND, progress).left_out
             _tell(progress, part, number, len(parts), time.perf_counter() - start)
-    kept = Kept(work, resume=True)
-    if arguments.page_only:
-        bundle = next((c.bundle for view in reversed(kept.views) for c in view.cells if c.bundle), None)
-    result = result_of(kept, COMMAND, bundle, [plain_path(line) for line in left_out])
+    bundle = bundle_of(arguments.bundle).label
+    result = result_of(Kept(work, resume=True), COMMAND, bundle, [plain_path(line) for line in left_out])
     if len(result.views) < whole * arguments.views and not arguments.quick:
         missing = (
             f"The suite has {whole} parts, less those that are opaque as authored; {len(result.views)} are measured."
@@ -75,6 +81,21 @@ def main() -> int:
     return 0
 
 
+def _begin(work: Path, fresh: bool) -> None:
+    """A new folder of results begins with what is committed of this machine and driver."""
+    rows = work / ROWS
+    if fresh:
+        rows.unlink(missing_ok=True)
+    committed = RESULTS / f"bench-{label()}.jsonl"
+    if fresh or rows.exists() or not committed.exists():
+        return
+    here = describe(gl_context()), machine()
+    views = [view for view in read_lines(committed).views if (view.driver, view.machine) == here]
+    work.mkdir(parents=True, exist_ok=True)
+    with replacing(rows) as path:
+        path.write_text(_lines(views), encoding="utf-8")
+
+
 def label() -> str:
     """Short name of the driver, for files: what the renderer is called before any bracket, slash or comma."""
     name = re.split(r"[(/,]", describe(gl_context()).lower())[0]
@@ -84,10 +105,9 @@ def label() -> str:
 def _publish(result: BenchResult) -> None:
     """The committed files of this driver, and the page of those of all drivers."""
     name = label()
-    lines = "".join(view.model_dump_json(exclude_defaults=True) + "\n" for view in result.views)
     head = result.model_copy(update={"views": ()}).model_dump_json(exclude_defaults=True)
     RESULTS.mkdir(exist_ok=True)
-    (RESULTS / f"bench-{name}.jsonl").write_text(f"{head}\n{lines}", encoding="utf-8")
+    (RESULTS / f"bench-{name}.jsonl").write_text(f"{head}\n{_lines(result.views)}", encoding="utf-8")
     found = {path.stem.removeprefix("bench-"): read_lines(path) for path in sorted(RESULTS.glob("bench-*.jsonl"))}
     drawn = {}
     for of, each in found.items():
@@ -96,6 +116,10 @@ def _publish(result: BenchResult) -> None:
             file.write_text(svg + "\n", encoding="utf-8")
             drawn[of, figure] = file.relative_to(PAGE.parent).as_posix()
     PAGE.write_text(page(found, drawn), encoding="utf-8")
+
+
+def _lines(views: Iterable[BenchView]) -> str:
+    return "".join(view.model_dump_json(exclude_defaults=True) + "\n" for view in views)
 
 
 def read_lines(path: Path) -> BenchResult:
@@ -110,14 +134,13 @@ def plain_path(line: str) -> str:
 
 
 def _options(part: Part, arguments: argparse.Namespace, work: Path) -> BenchOptions:
-    bundle = None if arguments.bundle is None else str(arguments.bundle)
     return BenchOptions(
         scenes=(part.case.path,),
-        techniques=parse_techniques(TECHNIQUES, bundle is not None),
+        techniques=parse_techniques(TECHNIQUES, has_bundle=True),
         out=work,
         alphas=(part.alpha,),
         sizes=(part.size,),
-        bundle=bundle,
+        bundle=str(arguments.bundle),
         views=part.case.views,
         most_views=arguments.views,
         variants=part.case.variants,
@@ -139,11 +162,12 @@ def _parse() -> argparse.Namespace:
     parser.add_argument("--alpha", dest="alphas", type=parse_alphas, default=ALPHAS, help="as of diaphane bench")
     parser.add_argument("--size", dest="sizes", type=parse_sizes, default=SIZES, help="as of diaphane bench")
     parser.add_argument("--views", type=int, default=1, help="of each scene")
-    parser.add_argument("--bundle", help="folder of a bundle")
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--limit", type=float, default=10.0, help="seconds for the repeats of one cell")
+    parser.add_argument("--bundle", type=Path, default=BUNDLE, help="folder of another bundle")
+    parser.add_argument("--repeats", type=int, default=2)
+    parser.add_argument("--limit", type=float, default=12.0, help="seconds for the repeats of one cell")
     parser.add_argument("--work", type=Path, default=ROOT / ".diaphane" / "bench", help="results under way")
     parser.add_argument("--quick", action="store_true", help="two scenes at 320x214, nothing is published")
+    parser.add_argument("--fresh", action="store_true", help="nothing that was measured before is kept")
     parser.add_argument("--page-only", action="store_true", help="measure nothing")
     arguments = parser.parse_args()
     if arguments.quick:

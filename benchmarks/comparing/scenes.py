@@ -16,7 +16,7 @@ SIZES = ((1430, 960), (1920, 1080))
 BUNDLE = "suite-"
 """How names of bundles begin that `benchmarks.comparing.bundle` trains on none of these scenes."""
 PATH_FRAMES = 3
-"""Of the camera path, at the first opacity and size: flicker costs as much as everything else there."""
+"""Of the camera path, at the suite's first opacity and size: flicker costs as much as everything else there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,5 +57,5 @@ def parts_of(
     for size in sizes:
         for alpha in alphas:
             for case in cases:
-                is_first = (alpha, size) == (alphas[0], sizes[0])
+                is_first = (alpha, size) == (ALPHAS[0], SIZES[0])
                 yield Part(case, alpha, size, PATH_FRAMES if is_first else 0)

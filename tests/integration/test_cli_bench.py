@@ -15,9 +15,11 @@ import pytest
 
 import services
 from benchmarks import suite
-from benchmarks.comparing.scenes import PATH_FRAMES
+from benchmarks.comparing import scenes
+from benchmarks.comparing.scenes import PATH_FRAMES, SHARED
 from renderer.samples import SAMPLES
 from schemas.bench import BenchResult
+from schemas.bundle import load_manifest
 from schemas.problem import ExitCode
 from services.bench.kept import ROWS
 from services.cli.app import run
@@ -174,6 +176,7 @@ def test_the_suite_publishes_its_results_and_a_page(
     (folder / "results").mkdir()
     monkeypatch.setattr(suite, "RESULTS", folder / "results")
     monkeypatch.setattr(suite, "PAGE", folder / "BENCH.md")
+    monkeypatch.setattr(scenes, "SIZES", ((48, 32),))
     monkeypatch.setattr(suite, "TECHNIQUES", ["sbuffer", "kbuffer", "kbuffer-importance"])
     options = ["--work", "work", "--only", "nested_shells", "--size", "48x32", "--alpha", ".33,authored"]
     monkeypatch.setattr("sys.argv", ["suite", *options, "--repeats", "1", "--scenes", "nowhere"])
@@ -191,3 +194,15 @@ def test_the_suite_publishes_its_results_and_a_page(
     rows = (folder / "work" / suite.label() / ROWS).read_text()
     assert suite.main() == 0
     assert (folder / "work" / suite.label() / ROWS).read_text() == rows
+    # So it does elsewhere from what is published, unless that is not wanted.
+    options[1] = "elsewhere"
+    monkeypatch.setattr("sys.argv", ["suite", *options, "--repeats", "1", "--scenes", "nowhere", "--page-only"])
+    assert suite.main() == 0
+    assert (folder / "elsewhere" / suite.label() / ROWS).read_text() == rows
+    monkeypatch.setattr("sys.argv", ["suite", "--work", "elsewhere", "--fresh", "--page-only"])
+    assert suite.main() == 1
+
+
+def test_the_suites_bundle_was_trained_on_none_of_its_scenes() -> None:
+    manifest = load_manifest(suite.BUNDLE)
+    assert not {*SHARED, *SAMPLES} & set(manifest.provenance.scenes)
