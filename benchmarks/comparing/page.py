@@ -9,7 +9,7 @@ from benchmarks.comparing.scenes import BUNDLE
 from schemas.bench import BenchResult, BenchView
 from services.bench.bars import error_bars
 from services.bench.groups import Group, groups_of
-from services.bench.page import said_machine
+from services.bench.page import said_machines
 
 PAPER = ("minecraft_village_caves", 2.0), ("sponza", 4.0)
 """DHOIT's two rows of Tables 1 and 2: Vokselia Spawn at M = 20 MB, here another voxel scene at F = 2 WH, and Crytek
@@ -56,7 +56,7 @@ def _driver(driver: str, result: BenchResult, drawn: Mapping[tuple[str, str], st
     about = first[0]
     alpha = "authored alpha" if about.alpha is None else f"alpha {about.alpha:g}"
     where = f"{alpha}, {about.width}x{about.height}"
-    parts = [f"## {driver}\n", *(f"{line}.\n" for line in dict.fromkeys(map(said_machine, views)))]
+    parts = [f"## {driver}\n", *(f"{line}.\n" for line in said_machines(views))]
     parts.append(_what(result))
     parts.append(f"### Figure 6: squared error within a budget ({where})\n")
     for factor in FACTORS:
@@ -66,6 +66,8 @@ def _driver(driver: str, result: BenchResult, drawn: Mapping[tuple[str, str], st
         parts.append(tables.errors(groups, factor))
     parts.append("### Score q, all views\n")
     parts.append(tables.scores(views))
+    parts.append("By opacity and size, F = 1 / 2 / 4 WH; a dash where the budget holds every view entirely:\n")
+    parts.append(tables.scores_by_setting(views))
     parts.append(_tables_of_the_paper(groups))
     parts.append(f"### Every technique ({where}, bounded ones at F = {FACTORS[0]:g} WH)\n")
     parts.append(tables.everything(first, FACTORS[0]))

@@ -97,6 +97,22 @@ def scores(views: Sequence[BenchView]) -> str:
     return table(head, lines)
 
 
+def scores_by_setting(views: Sequence[BenchView]) -> str:
+    """Q of each opacity and size, a column a technique: geometric means at equal fragments, budgets ascending."""
+    names = _names([group("", views)], "fragments")
+    settings = dict.fromkeys((view.alpha, view.width, view.height) for view in views)
+    lines = []
+    for alpha, width, height in settings:
+        of = [view for view in views if (view.alpha, view.width, view.height) == (alpha, width, height)]
+        found: dict[str, dict[float, float | None]] = {name: {} for name in names}
+        for row in measured(group("", of).rows, "fragments"):
+            found[said_technique(row.key)][row.key.budget_factor or 0.0] = row.score
+        cells = [" / ".join(number(by[factor]) for factor in sorted(by)) or NOT_MEASURED for by in found.values()]
+        opacity = "authored alpha" if alpha is None else f"alpha {alpha:g}"
+        lines.append([f"{opacity}, {width}x{height}", str(len(of)), *cells])
+    return table(("opacity, size", "scenes", *names), lines)
+
+
 def everything(views: Sequence[BenchView], factor: float) -> str:
     """All techniques over all views: time, memory, errors, flicker; bounded ones at one budget."""
     whole = group("", views)

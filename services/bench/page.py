@@ -51,7 +51,7 @@ def page(result: BenchResult, plots: Sequence[str], mixed: str | None) -> str:
             result=result,
             views=result.views,
             scenes=list(dict.fromkeys(view.scene for view in result.views)),
-            machines=list(dict.fromkeys(map(said_machine, result.views))),
+            machines=said_machines(result.views),
             mixed=mixed,
             figures=figures,
             groups=shown,
@@ -75,10 +75,13 @@ def charts_of(shown: Group) -> Drawn:
     return Drawn(tuple(svg for svg in svgs if svg), charts.legend(numbered))
 
 
-def said_machine(view: BenchView) -> str:
-    """Machine, driver, clock and commit of a view, in words."""
-    machine = ", ".join(f"{name} {value}" if name == "cores" else value for name, value in view.machine.items())
-    return f"{machine}; {view.driver}; {view.clock}; commit {view.commit or 'unknown'}"
+def said_machines(views: Sequence[BenchView]) -> list[str]:
+    """Machines, drivers and clocks of views in words, each with the commits that it measured."""
+    commits: dict[str, dict[str, None]] = {}
+    for view in views:
+        machine = ", ".join(f"{name} {value}" if name == "cores" else value for name, value in view.machine.items())
+        commits.setdefault(f"{machine}; {view.driver}; {view.clock}", {})[view.commit or "unknown"] = None
+    return [f"{where}; commit{'s'[: len(of) > 1]} {', '.join(of)}" for where, of in commits.items()]
 
 
 def _by_budget(rows: Sequence[Row]) -> list[tuple[str, list[Row]]]:
