@@ -1,4 +1,4 @@
-"""Slots of every pixel from predicted gain curves, by compute passes: nothing is read back within a frame.
+"""Slots of every pixel from predicted curves, by compute passes: nothing is read back within a frame.
 
 `renderer.allocation.lattice` is the same in numpy, and says why it is exact. In order:
 

@@ -88,6 +88,22 @@ def curves_of(a: NDArray[np.floating], b: NDArray[np.floating]) -> Curves:
     return Curves(gain, np.float32(1.0) / decay)
 
 
+def importance_curves(importance: NDArray[np.floating]) -> Curves:
+    """Importances as curves: `a = -1.5 / w` and `rate = w` give `k = floor(1.5 + (a + t) rate) = floor(t w)`.
+
+    The price t is the scale that `budget_fill` looks for. The counts are its counts, but that the scale is one of the
+    prices, at most t / 8192 apart from t = 1 on, and that the remainder goes by index to those that grow until the next
+    one, not to the largest fractions. `kbuffer-deep/curves.comp` has it so, too.
+
+    Args:
+        importance: [P], 0 to 1, or NaN, of a network that overflows. NaN is none, as is what is below LEAST_RATE: such
+            pixels share what is left evenly, once those above MOST_FRAGMENTS * LEAST_RATE (2e-25) are full.
+    """
+    rate: NDArray[np.float32] = np.fmax(np.asarray(importance, dtype=np.float32), np.float32(LEAST_RATE))
+    rate = np.fmin(rate, np.float32(MOST_RATE))
+    return Curves(np.float32(-1.5) / rate, rate)
+
+
 def price(index: int) -> np.float32:
     """The t of an index from -LAST to LAST: does not fall with it, and is 0 at 0."""
     bits = np.array([0x3F800000 + (abs(index) << SHIFT)], dtype=np.uint32)

@@ -1,9 +1,9 @@
 """`kbuffer-deep`: k(p) from a bundle's network, run as its own GLSL on sums gathered in the frame (METHOD.md 4).
 
 Nothing is read back within a frame: the network's curves stay on the GPU, where the one lambda is found that uses the
-budget (`renderer.allocation.gpu`), and the pool has as many slots as the budget allows. What the network has read is
-given back before fragments are captured, and so are its curves, unless another budget of the same frame is to need no
-inference.
+budget (`renderer.allocation.gpu`), and the pool has as many slots as the budget allows. Importances are turned into
+curves (`renderer.allocation.lattice.importance_curves`). What the network has read is given back before fragments are
+captured, and so are its curves, unless another budget of the same frame is to need no inference.
 """
 
 from __future__ import annotations
@@ -91,13 +91,13 @@ class KBufferDeep:
         inference: `glsl`: the bundle's shader; `onnx`: onnxruntime on features that are read back, for machines whose
             "GPU" is the CPU, where a shader's matrix products do not use its vector units well.
         solver: Where the slots are chosen: `gpu` in compute passes, `cpu` in numpy with two readbacks; None: where the
-            network runs, importances on the CPU. The counts are the same but for ties and roundings.
+            network runs. The counts are the same but for ties and roundings.
         keeps_curves: Whether what the network answers on the GPU stays there while fragments are captured: eight bytes
             a pixel, with which another budget of the same frame needs no inference.
 
     Raises:
         Problem: The bundle is damaged or not understood.
-        ValueError: The GPU is to solve what onnxruntime predicts, or importances.
+        ValueError: The GPU is to solve what onnxruntime predicts.
     """
 
     name = "kbuffer-deep"
@@ -111,8 +111,8 @@ class KBufferDeep:
         keeps_curves: bool = False,
     ) -> None:
         self.manifest = load_manifest(bundle)
-        if solver == "gpu" and (inference == "onnx" or self.manifest.head != "gain-curve"):
-            raise ValueError("the GPU solves gain curves that GLSL predicts")
+        if solver == "gpu" and inference == "onnx":
+            raise ValueError("the GPU solves what GLSL predicts")
         self._texts = {"bundle/predict.glsl": (bundle / GLSL).read_text(encoding="utf-8")}
         self._bins = DENSITY_BINS.get(self.manifest.tail.name, 0)
         self._texels = texels_of(self.manifest.feature_names, binned=bool(self._bins))
@@ -121,11 +121,11 @@ class KBufferDeep:
         texels = re.search(r"in vec4 s\[(\d+)\]", self._texts["bundle/predict.glsl"])
         self._defines: Defines = {
             **{"TEXELS": TEXELS if texels is None else int(texels[1]), "BINS": self._bins},
+            "OUTPUTS": len(self.manifest.outputs),
             **(BIN_DEFINES if self._bins else {}),
         }
         self._network = OnnxNetwork(bundle / ONNX) if inference == "onnx" else None
-        in_frame = inference == "glsl" and self.manifest.head == "gain-curve"
-        self._solver = solver or ("gpu" if in_frame else "cpu")
+        self._solver = solver or ("gpu" if inference == "glsl" else "cpu")
         self._keeps_curves = keeps_curves
         self._allocation: GpuAllocation | None = None
         self._prediction: _Prediction | None = None
@@ -272,8 +272,7 @@ class KBufferDeep:
     ) -> NDArray[np.float32]:
         """Run the compute shader on all pixels, as many at once as a storage buffer has rows for."""
         gathered = frame.gather("gather", self._texels, self._bins)
-        what = {"FEATURES_ONLY": int(features_only), "OUTPUTS": len(self.manifest.outputs)}
-        defines = {**what, **self._defines}
+        defines = {**self._defines, "FEATURES_ONLY": int(features_only)}
         program = frame.gpu.programs.compute("kbuffer-deep/predict.comp", defines, self._texts)
         rows = min(len(pixels), _DISPATCH, LIMITS.buffer_bytes // (4 * columns))
         result, listed = frame.ctx.buffer(reserve=4 * columns * rows), frame.ctx.buffer(pixels)

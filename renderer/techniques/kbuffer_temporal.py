@@ -110,7 +110,7 @@ class KBufferTemporal(KBufferDeep):
 
     Args:
         bundle: Folder of a bundle; its hashes are verified.
-        inference: As `KBufferDeep` has it; only curves that GLSL predicts can be corrected.
+        inference: As `KBufferDeep` has it; only gain curves that GLSL predicts can be corrected.
 
     Raises:
         Problem: The bundle is damaged or not understood.
@@ -129,7 +129,7 @@ class KBufferTemporal(KBufferDeep):
         Raises:
             Problem: There are no gain curves on the GPU.
         """
-        if self._solver == "cpu":
+        if self._solver == "cpu" or self.manifest.head != "gain-curve":
             raise Problem(
                 f"{self.name} corrects gain curves on the GPU, which this bundle or --inference does not leave there.",
                 "Use kbuffer-deep, or a bundle with gain curves and --inference glsl.",

@@ -14,7 +14,7 @@ from renderer.frame import Frame
 from renderer.programs import Defines, expand
 from renderer.techniques import Budget, KBufferDeep
 from renderer.techniques.chain import one_pass_available
-from schemas.bundle import GLSL, ParityReport, Provenance, TailSpec
+from schemas.bundle import GLSL, HeadName, OutputName, ParityReport, Provenance, TailSpec
 from schemas.fragments import FragmentDump
 from trainer.bundle import Description, write_bundle
 
@@ -37,12 +37,13 @@ class Client:
     Args:
         frame: The view.
         predict: The bundle's GLSL.
+        outputs: How many the bundle has.
     """
 
-    def __init__(self, frame: Frame, predict: str) -> None:
+    def __init__(self, frame: Frame, predict: str, outputs: int) -> None:
         self.frame, self.ctx = frame, frame.ctx
         self.width, self.height, self.pixels = frame.width, frame.height, frame.pixels
-        self.texts = {"bundle/predict.glsl": predict}
+        self.texts, self.outputs = {"bundle/predict.glsl": predict}, outputs
         self.groups = self.pixels // 2048 + 1
         self.state = self.words(312 // 4, 0)  # once
 
@@ -111,7 +112,7 @@ class Client:
         for unit, texture in enumerate([*sums, self.frame.background]):
             texture.use(unit)
         buffers = {0: self.state, 1: z_min, 2: z_max, 3: nearest, 5: curves, 6: count, 7: depth_bins}
-        network: Defines = {**CURVES, "MOST_RATE": 4096.0, "TEXELS": 11, **defines}
+        network: Defines = {**CURVES, "MOST_RATE": 4096.0, "TEXELS": 11, "OUTPUTS": self.outputs, **defines}
         self.run("kbuffer-deep/curves.comp", network, buffers, sixty_fours, **size)
         # 6
         self.run("allocation/list.comp", LATTICE, allocation, self.groups, pixels=self.pixels)
@@ -152,17 +153,32 @@ class Client:
         return linear[:, :, :3], np.diff(offsets)
 
 
-@pytest.mark.parametrize("one_pass", [False, True])
+@pytest.mark.parametrize(
+    ("one_pass", "head", "outputs"),
+    [
+        (False, "gain-curve", ("a", "b")),
+        (True, "gain-curve", ("a", "b")),
+        (False, "gain-curve", ("a", "b", "g")),
+        (False, "importance", ("importance",)),
+    ],
+)
 def test_the_documents_frame_is_the_technique(
-    ctx: moderngl.Context, frame: Frame, dump: FragmentDump, tmp_path: Path, one_pass: bool
+    ctx: moderngl.Context,
+    frame: Frame,
+    dump: FragmentDump,
+    tmp_path: Path,
+    one_pass: bool,
+    head: HeadName,
+    outputs: tuple[OutputName, ...],
 ) -> None:
     if one_pass and not one_pass_available(ctx):
         pytest.skip("this driver has no 64-bit atomics")
     provenance = Provenance(scenes={}, code_version="0", seed=0, machine="test")
     described = Description("glass", TailSpec(name="density-16", g=0.75), "display", 1, provenance, {})
     parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver="none")
-    write_bundle(tmp_path, random_weights(11), described, derive(gather(dump, bins=B)), lambda: parity)
-    deep, client = KBufferDeep(tmp_path), Client(frame, (tmp_path / GLSL).read_text())
+    network = random_weights(11, head=head, outputs=outputs)
+    write_bundle(tmp_path, network, described, derive(gather(dump, bins=B)), lambda: parity)
+    deep, client = KBufferDeep(tmp_path), Client(frame, (tmp_path / GLSL).read_text(), len(outputs))
     for budget in (dump.total // 3, dump.total // 2, 100, dump.total + 5):  # the later ones start warm
         expected = deep.render(frame, Budget(budget, "density-16", chain="one-pass" if one_pass else "two-pass"))
         linear, k = client.render(budget, one_pass=one_pass)

@@ -51,10 +51,16 @@ def compiled(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> 
         dump = capture(frame).dump
         hidden_fragments(frame)
         bundle = tmp_path_factory.mktemp("bundle")
-        export_random(bundle, random_weights(4), derive(gather(dump))[dump.counts > 0], gl)
+        features = derive(gather(dump))[dump.counts > 0]
+        export_random(bundle, random_weights(4), features, gl)
+        export_random(
+            bundle / "importances", random_weights(4, head="importance", outputs=("importance",)), features, gl
+        )
         needs = Needs(bundle=bundle, allocate=lambda frame, _: np.minimum(frame.count(), 2).astype(np.int32))
-        # Rows that are read back, as tests and the solver on the CPU do.
-        KBufferDeep(bundle, solver="cpu").render(frame, Budget(dump.total // 2, chain="two-pass"))
+        for folder in (bundle, bundle / "importances"):
+            KBufferDeep(folder).render(frame, Budget(dump.total // 2, chain="two-pass"))
+            # Rows that are read back, as tests and the solver on the CPU do.
+            KBufferDeep(folder, solver="cpu").render(frame, Budget(dump.total // 2, chain="two-pass"))
         for name in TECHNIQUES:
             for tail in TAILS if name == "kbuffer" else TAILS[:1]:
                 technique(name, needs).render(frame, Budget(dump.total // 2, tail, chain="two-pass"))

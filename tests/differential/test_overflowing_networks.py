@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import moderngl
 import numpy as np
 import pytest
-from support.training import export_random, random_weights
 
 from renderer.allocation.fill import feasible_k_min
 from renderer.allocation.lattice import curves_of, solve_on_lattice
-from renderer.features import FEATURES, derive, gather
 from renderer.frame import Frame
 from renderer.onnx_network import OnnxNetwork
 from renderer.techniques import Budget, KBufferDeep
@@ -66,17 +62,3 @@ def test_a_solver_on_the_cpu_meets_the_budget_too(
         assert (rendered.k >= np.minimum(dump.counts, feasible_k_min(dump.counts, budget))).all()
         assert (rendered.k <= dump.counts).all()
         assert np.isfinite(rendered.linear).all()
-
-
-def test_an_importance_that_is_nan_is_none(
-    frame: Frame, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    network = random_weights(5, FEATURES[:6], (8,), "importance", ("importance",))
-    export_random(tmp_path, network, derive(gather(dump))[dump.counts > 0], gl)
-    deep = KBufferDeep(tmp_path)
-    odd = np.arange(dump.pixels) % 2 == 1
-    monkeypatch.setattr(deep, "predict", lambda frame, pixels: np.where(odd[pixels], np.nan, 0.5)[:, None])
-    budget = int(np.count_nonzero(dump.counts)) + int((dump.counts[~odd] - 1).clip(0).sum()) // 2
-    rendered = deep.render(frame, Budget(budget, "density"))
-    assert rendered.captured == budget
-    assert (rendered.k[odd] == np.minimum(dump.counts[odd], 1)).all()

@@ -31,6 +31,8 @@ ALLOCATION = ("totals", "begin", "list", "count", "choose", "blocks", "scan", "o
 SURFACE: Defines = {"TEXTURED": 0, "MIXED": 1, "WRAPPED": 0, "MORE_UVS": 0, "EMISSIVE": 0}
 """Of the renderer's own surfaces, which a client replaces; `MIXED` is the document's."""
 
+IMPORTANCES = random_weights(1, head="importance", outputs=("importance",))
+
 # Shader -> constants, and defines that have no one value.
 COMPILED: list[tuple[str, tuple[str, ...], Defines]] = [
     ("count/count.frag", (), {"RANGE": 1}),
@@ -39,8 +41,8 @@ COMPILED: list[tuple[str, tuple[str, ...], Defines]] = [
     ("gather/gather.frag", (), {"BINS": 0, "NEAREST": 1, "SUMS1": 0, "SUMS3": 1}),
     ("gather/gather.frag", (), {"BINS": 0, "NEAREST": 0, **{f"SUMS{i}": i for i in range(5)}}),
     *((f"allocation/{name}.comp", LATTICE, {}) for name in ALLOCATION),
-    ("kbuffer-deep/curves.comp", (*CURVES, "TEXELS", *BINS), {"BINS": 16}),
-    ("kbuffer-deep/curves.comp", (*CURVES, "TEXELS"), {"BINS": 0}),
+    ("kbuffer-deep/curves.comp", (*CURVES, "TEXELS", *BINS), {"BINS": 16, "OUTPUTS": 2}),
+    ("kbuffer-deep/curves.comp", (*CURVES, "TEXELS"), {"BINS": 0, "OUTPUTS": 1}),
     ("kbuffer-deep/predict.comp", ("TEXELS", *BINS), {"BINS": 16, "FEATURES_ONLY": 0, "OUTPUTS": 2}),
     ("kbuffer/chain_depth.frag", (), {}),
     ("kbuffer/resolve.frag", BINS, {"TAIL": 4, "BINS": 16, "STRIDE": 2}),
@@ -77,8 +79,9 @@ def test_every_shader_compiles_with_what_is_defined_there(tmp_path: Path) -> Non
     for number, (name, constants, others) in enumerate(COMPILED):
         defines = {**others, **{constant: CONSTANTS[constant] for constant in constants}}
         surface = SURFACE if name.endswith(".frag") else {}
+        network = IMPORTANCES if defines.get("OUTPUTS") == 1 else random_weights(1)
         file = tmp_path / f"{number}{Path(name).suffix}"
-        file.write_text(expand(name, {**surface, **defines}, {"bundle/predict.glsl": shader_source(random_weights(1))}))
+        file.write_text(expand(name, {**surface, **defines}, {"bundle/predict.glsl": shader_source(network)}))
         files.append(file)
     done = subprocess.run(["glslangValidator", *files], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-3000:]

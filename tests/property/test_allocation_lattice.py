@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from renderer.allocation.fill import feasible_k_min, solve_lambda
+from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
 from renderer.allocation.lattice import (
     EDGES,
     LAST,
@@ -17,6 +17,7 @@ from renderer.allocation.lattice import (
     Curves,
     curves_of,
     fragments_at,
+    importance_curves,
     price,
     solve_on_lattice,
     within_limits,
@@ -100,6 +101,41 @@ def test_counts_are_those_of_float64_but_for_what_grows_between_two_prices(
     for p in np.flatnonzero(found.k != expected):
         k = np.arange(min(found.k[p], expected[p]) + 1, max(found.k[p], expected[p]) + 1)
         assert (np.abs((k - 1.5) * b[p].astype(np.float64) - a[p] + log_lambda) <= near).all()
+
+
+weight = st.one_of(
+    st.sampled_from([0.0, NAN, 1e-13, 0.25, 0.5, 1.0]),
+    st.floats(0.0, 1.0, width=32),
+    st.floats(-30.0, 0.0).map(lambda exponent: 10.0**exponent),
+)
+
+
+@settings(max_examples=300)
+@given(counts, st.data())
+def test_counts_of_importances_are_those_of_the_fill_but_for_what_grows_between_two_prices(
+    lists: list[int], data: st.DataObject
+) -> None:
+    n = np.array(lists)
+    w = np.array([data.draw(weight) for _ in lists], dtype=np.float32)
+    curves, budget = importance_curves(w), drawn_budget(data, n)
+    found, k_min = solve_on_lattice(curves, n, budget), feasible_k_min(n, budget)
+    # What is none has the least importance, so that it has a scale, too.
+    expected = budget_fill(curves.rate, n, budget, k_min)
+    assert found.k.sum() == expected.sum() == min(budget, n.sum())
+    assert (found.k >= np.minimum(n, k_min)).all()
+    if found.index is None:
+        return
+    t, following = float(price(found.index)), float(price(found.index + 1))
+    near = 2.0 * (following - t) + 1e-6 * t
+    for p in np.flatnonzero(found.k != expected):
+        k = np.arange(min(found.k[p], expected[p]) + 1, max(found.k[p], expected[p]) + 1)
+        assert (np.abs(k / curves.rate[p].astype(np.float64) - t) <= near).all()
+
+
+def test_without_importance_a_pixel_comes_last_and_is_like_its_kind() -> None:
+    w, n = np.array([NAN, 0.9, 1e-13, 0.0, 1e-35]), np.full(5, 9)
+    found = [solve_on_lattice(importance_curves(w), n, budget).k.tolist() for budget in (2, 5, 21, 27)]
+    assert found == [[0, 2, 0, 0, 0], [1, 1, 1, 1, 1], [1, 9, 9, 1, 1], [3, 9, 9, 3, 3]]
 
 
 @given(st.integers(-LAST, LAST - 1), gain, decay, st.integers(0, MOST_FRAGMENTS))

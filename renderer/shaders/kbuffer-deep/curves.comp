@@ -1,7 +1,8 @@
 #version 450
 // The bundle's network on the gathered sums of every open pixel, for the allocation within the frame: a and 1 / b of
 // log gain(k) = a - b (k-1). Pixels whose k their count alone settles have none; 1 / b is stored so that every later pass
-// has the same number.
+// has the same number. With OUTPUTS 1 the network answers an importance w, whose curve is k = floor(t w) at the price t
+// (renderer/allocation/lattice.py: importance_curves).
 layout(local_size_x = 64) in;
 #include "allocation/state.glsl"
 #include "kbuffer-deep/inputs.glsl"
@@ -23,6 +24,11 @@ void main() {
     if (p >= pixels || complete == 1u || count[p] <= k_min) return;
     float x[DIAPHANE_FEATURES];
     read_features(int(p), x);
+#if OUTPUTS == 1
+    float w = within(diaphane_predict(x), LEAST_RATE, MOST_RATE);
+    curve[p] = vec2(-1.5 / w, w);
+#else
     vec2 gain = diaphane_predict(x).xy;
     curve[p] = vec2(within(gain.x, -MOST_GAIN, MOST_GAIN), within(1.0 / gain.y, LEAST_RATE, MOST_RATE));
+#endif
 }

@@ -94,7 +94,7 @@ class Predictor:
             n: int [P], fragments of each pixel; None: what `log_n` says, where the network reads it.
 
         Returns:
-            int32 [P], k with `sum k = min(F, sum n)`: the counts of the Python renderer.
+            int32 [P], k with `sum k = min(F, sum n)`: the counts of the Python renderer, of importances but for ties.
 
         Raises:
             ValueError: An argument is not as described, or n is needed.
