@@ -8,31 +8,29 @@ python -m benchmarks.dashboard --out benchmarks/results/dashboard.json
 from __future__ import annotations
 
 import argparse
-import json
-import os
 import random
 import shutil
 import statistics
 import sys
 import tempfile
 import time
-from collections.abc import Mapping
-from contextlib import closing
-from datetime import UTC, datetime
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
 import httpx
 
-from benchmarks import compared_view
+from benchmarks import compared_view, provenance
 from benchmarks.load.seed import SCENES, WHO, Seed, seed
+from benchmarks.load.service import UNLIMITED
 from benchmarks.load.service import Service as Served
+from benchmarks.outputs import add_outputs, write_figures
 from schemas.job import JobSpec
 from services.database import tables
 from services.service import Service, open_service
 from services.settings import Settings
 from services.tasks import Task
-from services.versions import library_versions, machine
 from tests.support.bundles import make_bundle
 
 MODELS, JOBS, MEASUREMENTS = 200, 1000, 10_000
@@ -42,32 +40,27 @@ SECONDS = 1.0
 """What the first paint of a page may take."""
 
 _STAGES = ("scene", "render", "label", "train", "export", "evaluate")
-_UNLIMITED = {"DIAPHANE_RATE": "1000000", "DIAPHANE_BURST": "1000000"}
 
 
 def main() -> int:
     """Measures; 1 if a page's first paint, or without a browser its answer, takes longer than `SECONDS`."""
     arguments = _parse()
     found: dict[str, Any] = {
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": "python -m benchmarks.dashboard " + " ".join(sys.argv[1:]),
-        "machine": machine(),
-        "versions": library_versions(),
-        "load_average": os.getloadavg(),
+        **provenance.head("benchmarks.dashboard"),
         "seeded": {"models": MODELS, "jobs": JOBS, "measurements": MEASUREMENTS, "tasks": JOBS * TASKS_PER_JOB},
     }
-    folder = Path(tempfile.mkdtemp(prefix="diaphane-dashboard-"))
-    try:
+    with (
+        provenance.load_around(found),
+        tempfile.TemporaryDirectory(prefix="diaphane-dashboard-", ignore_cleanup_errors=True) as name,
+    ):
+        folder = Path(name)
         key, pages = fill(Settings(state=folder / "state"), folder)
-        with Served(folder / "state", "none", _UNLIMITED) as service:
+        with Served(folder / "state", "none", UNLIMITED) as service:
             service.wait_ready(600.0)
             url = f"http://127.0.0.1:{service.port}"
             found["pages"] = measure(url, key, pages, arguments.rounds)
             found["compare_ms"] = measure_compare(url, key, pages["compare"], arguments.rounds)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    arguments.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    write_figures(arguments.out, found)
     print(f"{'page':10} {'server, ms':>10} {'paint, ms':>10} {'kB':>6}")
     for name, one in found["pages"].items():
         print(f"{name:10} {one['server_ms']:10.1f} {one.get('paint_ms', float('nan')):10.1f} {one['kilobytes']:6.0f}")
@@ -113,9 +106,7 @@ def fill(settings: Settings, folder: Path) -> tuple[str, dict[str, str]]:
 def measure(url: str, secret: str, pages: Mapping[str, str], rounds: int) -> dict[str, dict[str, float]]:
     """Medians of each page: until the answer is complete, and until a browser paints it for the first time."""
     found: dict[str, dict[str, float]] = {}
-    with httpx.Client(base_url=url, timeout=60.0) as client:
-        signed_in = client.post("/sign-in", data={"key": secret}, headers={"Origin": url})
-        assert signed_in.status_code == 303, signed_in.text
+    with _signed_in(url, secret) as client:
         for name, path in pages.items():
             client.get(path)
             took, size = [], 0
@@ -134,9 +125,7 @@ def measure(url: str, secret: str, pages: Mapping[str, str], rounds: int) -> dic
 def measure_compare(url: str, secret: str, page: str, rounds: int) -> dict[str, float]:
     """Parts of the page Compare, ms: the first of its kind, and the median of further pixels."""
     where, found = page.partition("?")[2], {}
-    with httpx.Client(base_url=url, timeout=60.0) as client:
-        signed_in = client.post("/sign-in", data={"key": secret}, headers={"Origin": url})
-        assert signed_in.status_code == 303, signed_in.text
+    with _signed_in(url, secret) as client:
 
         def took(path: str) -> float:
             begun = time.perf_counter()
@@ -153,6 +142,14 @@ def measure_compare(url: str, secret: str, page: str, rounds: int) -> dict[str, 
             found[show] = took(f"/compare/picture.png?{where}&show={show}")
         found["flip again"] = took(f"/compare/picture.png?{where}&show=flip")
     return {name: round(milliseconds, 1) for name, milliseconds in found.items()}
+
+
+@contextmanager
+def _signed_in(url: str, secret: str) -> Iterator[httpx.Client]:
+    with httpx.Client(base_url=url, timeout=60.0) as client:
+        answer = client.post("/sign-in", data={"key": secret}, headers={"Origin": url})
+        assert answer.status_code == 303, answer.text
+        yield client
 
 
 def _paints(url: str, secret: str, pages: Mapping[str, str], rounds: int) -> dict[str, float]:
@@ -261,7 +258,7 @@ def _task(job_id: str, number: int, now: float) -> dict[str, Any]:
 
 def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="JSON file that the figures go to")
+    add_outputs(parser, required=True, has_page=False)
     parser.add_argument("--rounds", type=int, default=9, help="of each page")
     return parser.parse_args()
 

@@ -9,7 +9,6 @@ installed; Diaphane does not need it. Times are the least of several runs with t
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import tempfile
 import time
@@ -25,11 +24,13 @@ from numpy.typing import NDArray
 from safetensors import safe_open
 from safetensors.numpy import load_file, save_file
 
+from benchmarks import provenance
+from benchmarks.markdown import table
+from benchmarks.outputs import add_outputs, write_figures
 from labeller.columns import COLUMNS
 from labeller.dataset import Dataset, open_dataset
 from labeller.shard_file import BLOCK_ROWS, Columns, open_columns, write_columns
 from services.store import sync
-from services.versions import library_versions, machine
 from trainer.dataset import load_shards
 
 RANGE = 2000
@@ -162,31 +163,30 @@ def main() -> int:
         print("pyarrow is not installed: no Parquet", file=sys.stderr)
     else:
         formats += [Parquet("none"), Parquet("zstd")]
-    costs = [_cost(dataset, wanted, arguments.repeat) for wanted in formats]
-    threads = {count: _threads(dataset, count, arguments.repeat) for count in (1, 2, 4)}
+    found = provenance.head("benchmarks.dataset")
+    with provenance.load_around(found):
+        costs = [_cost(dataset, wanted, arguments.repeat) for wanted in formats]
+        threads = {count: _threads(dataset, count, arguments.repeat) for count in (1, 2, 4)}
     rows, segments = (sum(getattr(entry, name) for entry in dataset.index.shards) for name in ("rows", "segments"))
     print(f"{len(dataset.index.shards)} shards, {rows:,} rows, {segments / rows:.2f} segments a row\n")
-    print("| format | damage found | bytes a row | write, ms | whole read, ms | 2,000 rows, ms |")
-    print("|---|---|---|---|---|---|")
-    for cost in costs:
-        times = f"{cost.write_ms:.1f} | {cost.read_ms:.1f} | {cost.range_ms:.2f}"
-        print(f"| {cost.format} | {'yes' if cost.checked else 'no'} | {cost.bytes_per_row:.1f} | {times} |")
-    print()
+    heads = ("format", "damage found", "bytes a row", "write, ms", "whole read, ms", "2,000 rows, ms")
+    print(table(heads, map(_shown, costs)))
     for count, (read, load) in threads.items():
         print(f"{count} threads: all shards read in {read:.0f} ms, ready to train on in {load:.0f} ms")
-    if arguments.out is not None:
-        found = {
-            "command": "python -m benchmarks.dataset " + " ".join(sys.argv[1:]),
-            "machine": machine(),
-            "versions": library_versions(),
-            "shards": len(dataset.index.shards),
-            "rows": rows,
-            "segments": segments,
-            "formats": [asdict(cost) for cost in costs],
-            "threads": {str(n): {"read_ms": read, "load_ms": load} for n, (read, load) in threads.items()},
-        }
-        arguments.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    found |= {
+        "shards": len(dataset.index.shards),
+        "rows": rows,
+        "segments": segments,
+        "formats": [asdict(cost) for cost in costs],
+        "threads": {str(n): {"read_ms": read, "load_ms": load} for n, (read, load) in threads.items()},
+    }
+    write_figures(arguments.out, found)
     return 0
+
+
+def _shown(cost: Cost) -> tuple[str, ...]:
+    times = f"{cost.write_ms:.1f}", f"{cost.read_ms:.1f}", f"{cost.range_ms:.2f}"
+    return cost.format, "yes" if cost.checked else "no", f"{cost.bytes_per_row:.1f}", *times
 
 
 def _cost(dataset: Dataset, wanted: Format, repeat: int) -> Cost:
@@ -245,7 +245,7 @@ def _least(run: Callable[[], object], repeat: int) -> float:
 def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("folder", type=Path, help="folder of a data set")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="JSON file that the figures go to")
+    add_outputs(parser, has_page=False)
     parser.add_argument("--repeat", type=int, default=5, help="runs of which the quickest counts")
     return parser.parse_args()
 

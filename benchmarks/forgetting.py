@@ -9,10 +9,6 @@ and without; all are then measured on all of the scenes by jobs of the kind `eva
 from __future__ import annotations
 
 import argparse
-import json
-import os
-import shutil
-import sys
 import tempfile
 import textwrap
 import time
@@ -21,9 +17,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
 
+from benchmarks import provenance
 from benchmarks.load.http import HOST
 from benchmarks.load.service import Service
 from benchmarks.load.startup import ROLES
+from benchmarks.markdown import table
+from benchmarks.outputs import add_outputs, write_figures, write_page
 from renderer.samples import SAMPLES
 from services.cli.inputs import bring
 from services.cli.remote import Remote
@@ -32,7 +31,6 @@ from services.cli.watching import ensure_success
 from services.service import open_service
 from services.settings import Settings
 from services.summary import geometric_mean
-from services.versions import library_versions, machine
 
 OLD, NEW = ("bottles", "nested_shells"), "foliage"
 """The project's own scenes that are learned first, and the one that is learned then: glass, and leaves."""
@@ -60,30 +58,25 @@ def main() -> None:
     """Runs a service, and writes what came of its jobs."""
     arguments = _parse()
     found: JSON = {
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": "python -m benchmarks.forgetting " + " ".join(sys.argv[1:]),
-        "machine": machine(),
-        "versions": library_versions(),
+        **provenance.head("benchmarks.forgetting"),
         "old": list(OLD),
         "new": NEW,
         "settings": {**SETTINGS, "steps": arguments.steps},
     }
-    folder = Path(tempfile.mkdtemp(prefix="diaphane-forgetting-"))
-    try:
-        found["rows"] = _served(folder, arguments.steps)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    found["load_average"] = os.getloadavg()
-    arguments.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    if arguments.page is not None:
-        arguments.page.write_text(page(found), encoding="utf-8")
-    print(page(found))
+    with (
+        provenance.load_around(found),
+        tempfile.TemporaryDirectory(prefix="diaphane-forgetting-", ignore_cleanup_errors=True) as folder,
+    ):
+        found["rows"] = _served(Path(folder), arguments.steps)
+    text = page(found)
+    write_figures(arguments.out, found)
+    write_page(arguments.page, text)
+    print(text)
 
 
 def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="JSON file that the figures go to")
-    parser.add_argument("--page", type=Path, help="Markdown file that the table goes to")
+    add_outputs(parser, required=True)
     parser.add_argument("--steps", type=int, default=600, help="of each training")
     return parser.parse_args()
 
@@ -175,13 +168,12 @@ def page(found: Mapping[str, Any]) -> str:
     )
     lines = ["# Forgetting, measured on the service", "", f"```\n{found['command']}\n```", ""]
     lines += [textwrap.fill(how, _WIDTH), "", textwrap.fill(what, _WIDTH), ""]
-    lines += [f"| | old scenes | {' | '.join(names)} |", f"|---|---|{'---|' * len(names)}"]
+    rows = []
     for row in found["rows"]:
         scores = row["scores"]
         old = geometric_mean([scores[name] for name in found["old"]])
-        lines.append(f"| {row['title']} | {' | '.join(map(_shown, [old, *(scores[name] for name in names)]))} |")
-    where = ", ".join(f"{what} {value}" for what, value in found["machine"].items())
-    return "\n".join([*lines, "", f"*{where}; {found['created']}.*", ""])
+        rows.append([row["title"], *map(_shown, [old, *(scores[name] for name in names)])])
+    return "\n".join([*lines, table(("", "old scenes", *names), rows), f"*{provenance.said(found)}.*", ""])
 
 
 def _shown(score: float | None) -> str:

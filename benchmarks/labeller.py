@@ -3,7 +3,7 @@
 python -m benchmarks.labeller --out benchmarks/results/labeller.json --page benchmarks/LABELLER.md
 python -m benchmarks.labeller --only certified --out benchmarks/results/labeller.json --page benchmarks/LABELLER.md
 
-Parts that are not asked for stay in both files as they were measured before.
+Parts that are not asked for stay in both files as they were measured before. Plots lie beside the figures.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ import json
 import os
 import sys
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from benchmarks import provenance
+from benchmarks.casting.cases import SHARED
 from benchmarks.labelling.page import page, plots
 from benchmarks.labelling.parts import PARTS, Setting, run, wrong
-from benchmarks.render.setup import SHARED
-from services.versions import library_versions, machine
+from benchmarks.outputs import add_outputs, write_figures, write_page
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -34,21 +34,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{part}:", file=sys.stderr, flush=True)
         before = os.getloadavg()[0]
         found[part] = {
-            "created": datetime.now(UTC).isoformat(timespec="seconds"),
-            "machine": machine(),
-            "versions": library_versions(),
+            **provenance.head("benchmarks.labeller", arguments),
             "quick": given.quick,
             "found": run(part, setting),
             "load_average": {"before": before, "after": os.getloadavg()[0]},
         }
     text = page(found)
     print(text)
-    if given.out is not None:
-        given.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-        for name, svg in plots(found).items():
-            (given.out.parent / name).write_text(svg, encoding="utf-8")
-    if given.page is not None:
-        given.page.write_text(text, encoding="utf-8")
+    write_figures(given.out, found, plots(found))
+    write_page(given.page, text)
     problems = [line for part in given.only for line in wrong(part, found[part]["found"])]
     for line in problems:
         print(f"wrong: {line}", file=sys.stderr)
@@ -63,8 +57,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--rows", type=Path, help="JSON lines of what is certified: a stopped run goes on there.")
     parser.add_argument("--rounds", type=int, default=9, help="Rounds of what is measured in turns.")
     parser.add_argument("--quick", action="store_true", help="Tiny views: whether everything works, not how fast.")
-    parser.add_argument("--out", type=Path, help="Where the figures go, JSON; plots go beside it.")
-    parser.add_argument("--page", type=Path, help="Where the page goes, Markdown.")
+    add_outputs(parser)
     return parser.parse_args(arguments)
 
 

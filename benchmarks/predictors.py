@@ -4,9 +4,9 @@ python -m benchmarks.predictors --scenes ../shared/scenes --work FOLDER \
     --out benchmarks/results/predictors.json --page benchmarks/PREDICTORS.md
 
 It can be stopped at any time and goes on where it was: dumps, labels, networks and scores lie in `--work`, and are
-made again only where the data or the code that decides them have changed. Without `--scenes` it takes the project's
-own scenes alone. All variants take days at full size: `--size 358x240 --views 1 --folds 3` and another `--out` tries
-them on an eighth of the pixels.
+made again only where the data or the code that decides them have changed. Plots lie beside the figures. Without
+`--scenes` it takes the project's own scenes alone. All variants take days at full size: `--size 358x240 --views 1
+--folds 3` and another `--out` tries them on an eighth of the pixels.
 """
 
 from __future__ import annotations
@@ -16,10 +16,11 @@ import json
 import sys
 import time
 from collections.abc import Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from benchmarks import provenance
+from benchmarks.outputs import add_outputs, write_figures, write_page
 from benchmarks.predicting.page import page, plots
 from benchmarks.predicting.store import Store
 from benchmarks.predicting.summary import rules_summary, score, tails_summary, variant_summary
@@ -27,7 +28,6 @@ from benchmarks.predicting.tails import scored
 from benchmarks.predicting.training import Trainings
 from benchmarks.predicting.variants import Variant, variants
 from benchmarks.predicting.views import views_of
-from services.versions import commit, library_versions, machine
 
 PARTS = (
     *("variants", "bundles", "rules", "features", "sizes", "seeds", "presets", "losses", "labels", "inputs"),
@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "assets": len(trainings.fold),
         "folds": len(trainings.folds),
     }
-    found = _before(given.out, setting)
+    found = _before(given.out, setting, arguments)
     for part in given.parts:
         if part == "rules":
             found["rules"] = rules_summary(store, rows)
@@ -77,28 +77,21 @@ def _wanted(part: str, names: Sequence[str] | None) -> list[Variant]:
     return [x for x in variants().values() if x.part == part and (names is None or x.name in names)]
 
 
-def _before(out: Path | None, setting: dict[str, Any]) -> dict[str, Any]:
+def _before(out: Path | None, setting: dict[str, Any], arguments: Sequence[str] | None) -> dict[str, Any]:
     """What is in the file from earlier runs on the same views, brought up to date."""
     found: dict[str, Any] = {"variants": {}}
     if out is not None and out.exists():
         kept = json.loads(out.read_text(encoding="utf-8"))
         found = kept if kept["setting"] == setting else found
-    found["setting"] = setting
-    found["created"] = datetime.now(UTC).isoformat(timespec="seconds")
-    found |= {"machine": machine(), "versions": library_versions(), "commit": commit()}
-    return found
+    return {**found, "setting": setting, **provenance.head("benchmarks.predictors", arguments)}
 
 
 def _write(out: Path | None, where: Path | None, found: dict[str, Any]) -> None:
     order = list(variants())
     known = {name: row for name, row in found["variants"].items() if name in order}
     found["variants"] = dict(sorted(known.items(), key=lambda item: order.index(item[0])))
-    if out is not None:
-        out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-        for name, svg in plots(found, out.stem).items():
-            (out.parent / name).write_text(svg, encoding="utf-8")
-    if where is not None:
-        where.write_text(page(found, _name(out)), encoding="utf-8")
+    write_figures(out, found, plots(found, _name(out)))
+    write_page(where, page(found, _name(out)))
 
 
 def _name(out: Path | None) -> str:
@@ -115,8 +108,7 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--folds", type=int, default=5, help="Parts of the assets, each held out once.")
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--variants", nargs="+", metavar="NAME", help="Of the parts, these variants only.")
-    parser.add_argument("--out", type=Path, help="Where the figures go, JSON; plots go beside it.")
-    parser.add_argument("--page", type=Path, help="Where the page goes, Markdown.")
+    add_outputs(parser)
     parser.add_argument("--page-only", action="store_true", help="Nothing is measured: the page of what is in --out.")
     given = parser.parse_args(arguments)
     if given.page_only and given.out is None:

@@ -6,20 +6,18 @@ python -m benchmarks.renderer --bundle FOLDER --out benchmarks/results/renderer.
 from __future__ import annotations
 
 import argparse
-import json
-import os
 import sys
 from contextlib import nullcontext
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from benchmarks import provenance
+from benchmarks.outputs import add_outputs, write_figures, write_page
 from benchmarks.render import measure
 from benchmarks.render.bundle import random_bundle
 from benchmarks.render.page import page
 from benchmarks.render.setup import subjects
 from renderer.context import describe, gl_context
-from services.versions import library_versions, machine
 
 PARTS = ("capture", "views", "learned")
 
@@ -29,17 +27,13 @@ def main() -> int:
     arguments = _parse()
     ctx = gl_context()
     found: dict[str, Any] = {
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": "python -m benchmarks.renderer " + " ".join(sys.argv[1:]),
+        **provenance.head("benchmarks.renderer"),
         "driver": describe(ctx),
-        "machine": machine(),
-        "versions": library_versions(),
-        "load_average": {"before": os.getloadavg()},
         "bundle": "random weights" if arguments.bundle is None else "given",
         **{part: [] for part in arguments.parts},
     }
     trained: Path | None = arguments.bundle
-    with nullcontext(trained) if trained is not None else random_bundle(ctx) as bundle:
+    with provenance.load_around(found), nullcontext(trained) if trained is not None else random_bundle(ctx) as bundle:
         for subject in subjects(ctx, tuple(arguments.scenes)):
             print(f"{subject.name}: {', '.join(arguments.parts)}", file=sys.stderr, flush=True)
             if "capture" in arguments.parts:
@@ -48,13 +42,10 @@ def main() -> int:
                 found["views"].append(measure.second_view(subject, arguments.rounds))
             if "learned" in arguments.parts:
                 found["learned"].append(measure.learned_cost(subject, bundle, arguments.rounds))
-    found["load_average"]["after"] = os.getloadavg()
     text = page(found)
     print(text)
-    if arguments.out is not None:
-        arguments.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    if arguments.page is not None:
-        arguments.page.write_text(text, encoding="utf-8")
+    write_figures(arguments.out, found)
+    write_page(arguments.page, text)
     return 0
 
 
@@ -64,8 +55,7 @@ def _parse() -> argparse.Namespace:
     parser.add_argument("--scenes", nargs="+", choices=("thicket", "sponza"), default=["thicket", "sponza"])
     parser.add_argument("--rounds", type=int, default=9, help="Rounds of what is measured in turns.")
     parser.add_argument("--bundle", type=Path, help="Folder of a trained bundle; without it, random weights.")
-    parser.add_argument("--out", type=Path, help="Where the figures go, JSON.")
-    parser.add_argument("--page", type=Path, help="Where the page goes, Markdown.")
+    add_outputs(parser)
     return parser.parse_args()
 
 

@@ -7,9 +7,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import shutil
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,58 +16,48 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from benchmarks import provenance
 from benchmarks.load import flow, phases, startup, throughput
 from benchmarks.load.figures import Tally
 from benchmarks.load.page import page
 from benchmarks.load.phases import Plan
 from benchmarks.load.seed import Seed, seed
-from benchmarks.load.service import Sampler, Service
+from benchmarks.load.service import UNLIMITED, Sampler, Service
 from benchmarks.load.traffic import Mix
+from benchmarks.outputs import add_outputs, write_figures, write_page
 from services.database import open_database
 from services.settings import Settings
-from services.versions import library_versions, machine
 from tests.support.postgres import Postgres, postgres_folder
 
 PARTS = ("ready", "blobs", "queued", "flow")
-UNLIMITED = {"DIAPHANE_RATE": "1000000", "DIAPHANE_BURST": "1000000"}
-"""The load comes from one key."""
 FLOW_SECONDS = 90.0
 
 
 def main() -> int:
     """Runs what was asked for; 1 if there were errors."""
     arguments = _parse()
-    found: dict[str, Any] = {
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": "python -m benchmarks.service_load " + " ".join(sys.argv[1:]),
-        "machine": machine(),
-        "versions": library_versions(),
-        "load_average": {"before": os.getloadavg()},
-    }
-    folder = Path(tempfile.mkdtemp(prefix="diaphane-load-"))
-    folder.chmod(0o755)  # nginx and PostgreSQL run as other users
-    try:
+    found = provenance.head("benchmarks.service_load")
+    with (
+        provenance.load_around(found),
+        tempfile.TemporaryDirectory(prefix="diaphane-load-", ignore_cleanup_errors=True) as name,
+    ):
+        folder = Path(name)
+        folder.chmod(0o755)  # nginx and PostgreSQL run as other users
         with _databases(arguments, folder) as urls:
             _run(arguments, folder, urls, found)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    found["load_average"]["after"] = os.getloadavg()
     if arguments.add and arguments.out.exists():
         earlier = json.loads(arguments.out.read_text(encoding="utf-8"))
         found.update({part: earlier[part] for part in PARTS if part in earlier and part not in found})
     found["errors"] = sum(run["errors"] for part in ("queued", "flow") for run in found.get(part, {}).values())
-    arguments.out.parent.mkdir(parents=True, exist_ok=True)
-    arguments.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    if arguments.page is not None:
-        arguments.page.write_text(page(found), encoding="utf-8")
+    write_figures(arguments.out, found)
+    write_page(arguments.page, page(found))
     print(f"{found['errors']} errors; figures in {arguments.out}")
     return 1 if found["errors"] else 0
 
 
 def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="JSON file that the figures go to")
-    parser.add_argument("--page", type=Path, help="Markdown file that the tables go to")
+    add_outputs(parser, required=True)
     parser.add_argument("--parts", default=",".join(PARTS), help=f"what is measured, of {','.join(PARTS)}")
     parser.add_argument("--seconds", type=float, default=30.0, help="of each phase")
     parser.add_argument("--jobs", type=int, default=1000, help="submitted in each phase")
@@ -141,9 +128,11 @@ def _phase(service: Service, held: Seed, plan: Plan, settings: Settings) -> dict
 
 
 def _noted(measure: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """What is measured, with the time and the load of the machine before and after: others may use it too."""
-    created, before = datetime.now(UTC).isoformat(timespec="seconds"), os.getloadavg()
-    return {**measure(), "created": created, "load_average": {"before": before, "after": os.getloadavg()}}
+    """What is measured, with the time and the load of the machine before and after."""
+    found: dict[str, Any] = {"created": provenance.now()}
+    with provenance.load_around(found):
+        found |= measure()
+    return found
 
 
 def _figures(

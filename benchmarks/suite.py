@@ -1,4 +1,4 @@
-"""The committed benchmark: every technique on the papers' kind of scenes and the project's own, and a page of it.
+"""The committed benchmark: techniques that a still frame shows, on the papers' scenes and our own, and a page of it.
 
 python -m benchmarks.suite
 
@@ -20,7 +20,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from benchmarks.comparing.page import page, pictures
-from benchmarks.comparing.scenes import ALPHAS, SIZES, Part, cases_of, parts_of
+from benchmarks.comparing.scenes import ALPHAS, BUNDLE, PARTS, SHARED, SIZES, Part, cases_of, parts_of
 from renderer.context import describe, gl_context
 from renderer.techniques import TECHNIQUES as technique_entries
 from schemas.bench import BenchResult, BenchView
@@ -38,8 +38,6 @@ ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
 PAGE = ROOT / "benchmarks" / "BENCH.md"
 COMMAND = "make bench"
-BUNDLE = ROOT / "benchmarks" / "bundle"
-"""What `benchmarks.comparing.bundle` made: it was trained on none of the suite's scenes."""
 TECHNIQUES = [name for name, entry in technique_entries.items() if entry.settles == 1]
 """Those that a still frame shows. `kbuffer-temporal` learns from frames: it is measured by `benchmarks.temporal`."""
 _QUICK = {"sizes": ((320, 214),), "alphas": (0.33,), "scenes": ("sponza", "bottles")}
@@ -50,12 +48,12 @@ def main() -> int:
     arguments = _parse()
     progress = make_progress(sys.stderr)
     work = arguments.work / ("quick" if arguments.quick else label())
-    if not arguments.quick:
-        _begin(work, arguments.fresh)
+    _begin(work, arguments.fresh, with_committed=not arguments.quick)
     left_out: list[str] = []
     with tempfile.TemporaryDirectory(prefix="diaphane-suite-") as folder:
         every = cases_of(arguments.scenes, Path(folder))
-        whole = len(list(parts_of(every)))
+        if absent := {*SHARED} - {case.scene for case in every}:
+            progress.note(f"{', '.join(sorted(absent))}: not in {arguments.scenes}, left out")
         cases = [case for case in every if not arguments.only or case.scene in arguments.only.split(",")]
         parts = list(parts_of(cases, arguments.alphas, arguments.sizes))
         for number, part in enumerate(parts if not arguments.page_only else ()):
@@ -64,11 +62,9 @@ def main() -> int:
             _tell(progress, part, number, len(parts), time.perf_counter() - start)
     bundle = bundle_of(arguments.bundle).label
     result = result_of(Kept(work, resume=True), COMMAND, bundle, [plain_path(line) for line in left_out])
-    if len(result.views) < whole * arguments.views and not arguments.quick:
-        missing = (
-            f"The suite has {whole} parts, less those that are opaque as authored; {len(result.views)} are measured."
-        )
-        result = result.model_copy(update={"left_out": (*result.left_out, missing)})
+    if len(result.views) < PARTS * arguments.views and not arguments.quick:
+        said = f"The suite has {PARTS} parts, less those that are opaque as authored; {len(result.views)} are measured."
+        result = result.model_copy(update={"left_out": (*result.left_out, said)})
     if not result.views:
         print("Nothing was measured.", file=sys.stderr)
         return 1
@@ -81,19 +77,18 @@ def main() -> int:
     return 0
 
 
-def _begin(work: Path, fresh: bool) -> None:
-    """A new folder of results begins with what is committed of this machine and driver."""
-    rows = work / ROWS
+def _begin(work: Path, fresh: bool, with_committed: bool) -> None:
+    """What is kept of earlier runs, and of this machine and driver what is committed and not there."""
     if fresh:
-        rows.unlink(missing_ok=True)
+        (work / ROWS).unlink(missing_ok=True)
     committed = RESULTS / f"bench-{label()}.jsonl"
-    if fresh or rows.exists() or not committed.exists():
+    if fresh or not with_committed or not committed.exists():
         return
-    here = describe(gl_context()), machine()
-    views = [view for view in read_lines(committed).views if (view.driver, view.machine) == here]
-    work.mkdir(parents=True, exist_ok=True)
-    with replacing(rows) as path:
-        path.write_text(_lines(views), encoding="utf-8")
+    own = Kept(work, resume=True).views
+    known, here = {view.key for view in own}, (describe(gl_context()), machine())
+    views = [v for v in read_lines(committed).views if v.key not in known and (v.driver, v.machine) == here]
+    with replacing(work / ROWS) as path:
+        path.write_text(_lines([*views, *own]), encoding="utf-8")
 
 
 def label() -> str:
@@ -108,14 +103,18 @@ def _publish(result: BenchResult) -> None:
     head = result.model_copy(update={"views": ()}).model_dump_json(exclude_defaults=True)
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / f"bench-{name}.jsonl").write_text(f"{head}\n{_lines(result.views)}", encoding="utf-8")
+    text, drawn = published()
+    for file, svg in drawn.items():
+        (PAGE.parent / file).write_text(svg + "\n", encoding="utf-8")
+    PAGE.write_text(text, encoding="utf-8")
+
+
+def published() -> tuple[str, dict[str, str]]:
+    """The page of all committed results, and its figures: file, relative to the page, -> text."""
     found = {path.stem.removeprefix("bench-"): read_lines(path) for path in sorted(RESULTS.glob("bench-*.jsonl"))}
-    drawn = {}
-    for of, each in found.items():
-        for figure, svg in pictures(each).items():
-            file = RESULTS / f"bench-{of}-{figure}.svg"
-            file.write_text(svg + "\n", encoding="utf-8")
-            drawn[of, figure] = file.relative_to(PAGE.parent).as_posix()
-    PAGE.write_text(page(found, drawn), encoding="utf-8")
+    drawn = {(of, figure): svg for of, each in found.items() for figure, svg in pictures(each).items()}
+    files = {(of, figure): f"{RESULTS.name}/bench-{of}-{figure}.svg" for of, figure in drawn}
+    return page(found, files), {files[key]: svg for key, svg in drawn.items()}
 
 
 def _lines(views: Iterable[BenchView]) -> str:

@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import statistics
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -23,7 +21,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.comparing.scenes import SHARED, cases_of
+from benchmarks import provenance
+from benchmarks.casting.cases import SHARED
+from benchmarks.comparing import scenes as suite
+from benchmarks.markdown import table
+from benchmarks.outputs import add_outputs, write_figures, write_page
 from renderer.scene import LoadOptions
 from renderer.techniques import Budget, Needs, Technique, technique
 from schemas.bundle import load_manifest
@@ -34,9 +36,8 @@ from services.bench.measure import over
 from services.bench.rounds import shoot
 from services.bench.subject import Subject
 from services.local_scenes import LocalScene
-from services.versions import commit, library_versions, machine
 
-SCENES = (*SHARED, "bottles", "foliage", "curtains", "hair_cards")
+SCENES = (*suite.SHARED, "bottles", "foliage", "curtains", "hair_cards")
 SIZE = (320, 214)
 ALPHA = 0.33
 BUDGETS = (1.0, 2.0)
@@ -76,27 +77,25 @@ def main() -> int:
     """Measures, and writes the results and their page."""
     given = _parse()
     found: JSON = {
-        "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": "python -m benchmarks.temporal",
-        "machine": machine(),
-        "versions": library_versions(),
-        "commit": commit(),
+        **provenance.head("benchmarks.temporal"),
         "bundle": load_manifest(given.bundle).name,
         "rows": [],
     }
+    with provenance.load_around(found):
+        for row in _rows(given):
+            found["rows"].append(row)
+            print(json.dumps(row), file=sys.stderr)
+    write_figures(given.out, found)
+    write_page(given.page, page(found))
+    return 0
+
+
+def _rows(given: argparse.Namespace) -> Iterator[JSON]:
     for scene, subject in _subjects(given.scenes, given.only.split(",")):
         for factor in BUDGETS:
             budget = max(1, int(factor * subject.pixels))
             if budget < subject.dump.total:
-                found["rows"].append(
-                    {"scene": scene, "budget_factor": factor, **measure(subject, budget, given.bundle)}
-                )
-                print(json.dumps(found["rows"][-1]), file=sys.stderr)
-    found["load_average"] = os.getloadavg()
-    given.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    if given.page is not None:
-        given.page.write_text(page(found), encoding="utf-8")
-    return 0
+                yield {"scene": scene, "budget_factor": factor, **measure(subject, budget, given.bundle)}
 
 
 def measure(subject: Subject, budget: int, bundle: Path) -> JSON:
@@ -166,7 +165,7 @@ def _shot(subject: Subject, made: Technique, budget: Budget) -> Shot:
 
 def _subjects(scenes: Path, wanted: Sequence[str]) -> Iterator[tuple[str, Subject]]:
     with tempfile.TemporaryDirectory(prefix="diaphane-temporal-") as folder:
-        for case in cases_of(scenes, Path(folder)):
+        for case in suite.cases_of(scenes, Path(folder)):
             if case.scene in wanted:
                 local = LocalScene(case.path, case.path, LoadOptions(alpha=ALPHA, variants=case.variants))
                 local.at(None)
@@ -176,11 +175,9 @@ def _subjects(scenes: Path, wanted: Sequence[str]) -> Iterator[tuple[str, Subjec
 
 def page(found: Mapping[str, Any]) -> str:
     """The results as Markdown."""
-    on = found["machine"]
-    about = f"{on['processor']}, {on['cores']} cores, {on['memory']}"
     lines = [
         "# Learning from the last frame, measured\n",
-        f"```\n{found['command']} --bundle FOLDER --out benchmarks/results/temporal.json \\\n"
+        "```\npython -m benchmarks.temporal --bundle FOLDER --out benchmarks/results/temporal.json \\\n"
         "    --page benchmarks/TEMPORAL.md\n```\n",
         "`kbuffer-temporal` over `kbuffer-deep`: squared displayed error and flicker (as `diaphane bench` has it) as\n"
         f"factors, below 1 is better, errors with 1e-7 added as in scores; opacity {ALPHA:g}, {SIZE[0]}x{SIZE[1]}.\n"
@@ -188,19 +185,23 @@ def page(found: Mapping[str, Any]) -> str:
         f"frames at rest; means over {MOVING} frames. *k*: mean change of k from frame to frame without and with\n"
         "learning, at .45 degrees. *Time*: of a frame, median of frames in turns. A dash: neither flickers by\n"
         f"{STEADY:g} of the display's range.\n",
-        f"Bundle: {found['bundle']}; *{about}; {found['created']}.*\n",
-        "| scene | F / WH | " + " | ".join(f"at rest, {frame}" for frame in SHOWN) + " | "
-        "" + " | ".join(f"error, {step:g}°" for step in STEPS) + " | "
-        "" + " | ".join(f"flicker, {step:g}°" for step in STEPS) + " | k | time |",
-        "|" + " --- |" * (4 + len(SHOWN) + 2 * len(STEPS)),
+        f"Bundle: {found['bundle']}; *{provenance.said(found)}.*\n",
     ]
-    for row in found["rows"]:
-        moving = [row["moving"][str(step)] for step in STEPS]
-        numbers = [*row["still"].values(), *(each["error"] for each in moving), *(each["flicker"] for each in moving)]
-        k = " → ".join(f"{value:.2f}" for value in row["moving"][str(STEPS[1])]["k"])
-        cells = [row["scene"], f"{row['budget_factor']:g}", *map(_number, numbers), k]
-        lines.append(f"| {' | '.join(cells)} | {row['milliseconds']:.2f} |")
-    return "\n".join(lines) + "\n"
+    heads = [
+        *("scene", "F / WH"),
+        *(f"at rest, {frame}" for frame in SHOWN),
+        *(f"{what}, {step:g}°" for what in ("error", "flicker") for step in STEPS),
+        *("k", "time"),
+    ]
+    return "\n".join([*lines, table(heads, map(_cells, found["rows"]))])
+
+
+def _cells(row: Mapping[str, Any]) -> list[str]:
+    moving = [row["moving"][str(step)] for step in STEPS]
+    numbers = [*row["still"].values(), *(each["error"] for each in moving), *(each["flicker"] for each in moving)]
+    k = " → ".join(f"{value:.2f}" for value in row["moving"][str(STEPS[1])]["k"])
+    cells = [row["scene"], f"{row['budget_factor']:g}", *map(_number, numbers), k]
+    return [*cells, f"{row['milliseconds']:.2f}"]
 
 
 def _number(value: float | None) -> str:
@@ -209,12 +210,10 @@ def _number(value: float | None) -> str:
 
 def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    shared = Path(__file__).resolve().parents[2] / "shared" / "scenes"
     parser.add_argument("--bundle", type=Path, required=True, help="Folder of a bundle with gain curves.")
-    parser.add_argument("--scenes", type=Path, default=shared, help="Folder with MANIFEST.json.")
+    parser.add_argument("--scenes", type=Path, default=SHARED, help="Folder with MANIFEST.json.")
     parser.add_argument("--only", default=",".join(SCENES), help="Names of scenes, with commas between.")
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE", help="JSON file that the figures go to.")
-    parser.add_argument("--page", type=Path, help="Markdown file that the table goes to.")
+    add_outputs(parser, required=True)
     return parser.parse_args()
 
 

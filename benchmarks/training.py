@@ -1,4 +1,4 @@
-"""What presets, early stopping and replay are worth: `python -m benchmarks.training STATE NAME [--json FILE]`.
+"""What presets, early stopping and replay are worth: `python -m benchmarks.training STATE NAME [--out FILE]`.
 
 STATE is the folder of a local build and NAME its data set; trained on its training scenes, scored on its held-out
 ones: squared error of the allocation over the optimum's, geometric mean over views and budgets. docs/TRAINING.md has
@@ -8,7 +8,6 @@ the tables.
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -18,7 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks import provenance
 from benchmarks.dataset_views import stored_views
+from benchmarks.markdown import table
+from benchmarks.outputs import add_outputs, write_figures
 from renderer.allocation.fill import budget_fill, paper_fill
 from trainer.config import TrainConfig
 from trainer.dataset import GROUP, Drawing, ViewData
@@ -140,23 +142,21 @@ def main() -> None:
     parser.add_argument("state", type=Path)
     parser.add_argument("name")
     parser.add_argument("--only", choices=PARTS, action="append", help="one of the tables; repeatable")
-    parser.add_argument("--json", type=Path, help="file that the numbers go to")
+    add_outputs(parser, has_page=False)
     given = parser.parse_args()
     views, held_out = stored_views(given.state, given.name)
     judges = [view.subset(SCORED_ROWS, 0) for view in held_out]
-    found = {}
-    for part in given.only or PARTS:
-        found[part] = PARTS[part](views, judges)
-        _show(part, found[part])
-    if given.json is not None:
-        given.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    found = provenance.head("benchmarks.training")
+    with provenance.load_around(found):
+        for part in given.only or PARTS:
+            found[part] = PARTS[part](views, judges)
+            _show(part, found[part])
+    write_figures(given.out, found)
 
 
 def _show(title: str, rows: Sequence[Row]) -> None:
     columns = list(dict.fromkeys(column for row in rows for column in row))
-    print(f"\n{title}\n\n| {' | '.join(columns)} |\n|{'---|' * len(columns)}", flush=True)
-    for row in rows:
-        print(f"| {' | '.join(str(row.get(column, '')) for column in columns)} |", flush=True)
+    print(f"\n{title}\n\n{table(columns, ([row.get(column, '') for column in columns] for row in rows))}", flush=True)
 
 
 if __name__ == "__main__":

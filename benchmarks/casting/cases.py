@@ -13,6 +13,12 @@ from renderer.views import listed_views, placed_views, sampled_views
 from schemas.scene import SceneArrays
 from schemas.view import View
 
+SHARED = Path(__file__).resolve().parents[3] / "shared" / "scenes"
+"""Where the scenes lie that do not come with the project, with their MANIFEST.json; they may be missing."""
+MODES: dict[str, float | None] = {"alpha .33": 0.33, "authored": None}
+"""Opacity of every surface, by name: one for all, so that every surface counts; and each its own."""
+_SAMPLED = 2
+"""Views of a stage for which none are listed."""
 _SEED = 11
 
 
@@ -34,13 +40,18 @@ class Case:
     triangles: int | None = None
     views: Path | None = None
 
-    def cameras(self, scene: SceneArrays, count: int) -> tuple[View, ...]:
-        """Up to `count` listed views, spread over the list; sampled ones where none are listed."""
+    def cameras(self, scene: SceneArrays, most: int | None) -> tuple[View, ...]:
+        """The views of the stage.
+
+        Args:
+            scene: As loaded.
+            most: So many, spread over those that are listed, or sampled where none are; None: all, or two.
+        """
         listed = listed_views(self.views, self.path) if self.views is not None else ()
         if not listed:
-            return sampled_views(scene, count, _SEED)
-        every = max(1, len(listed) // count)
-        return placed_views(listed, scene)[::every][:count]
+            return sampled_views(scene, _SAMPLED if most is None else most, _SEED)
+        placed = placed_views(listed, scene)
+        return placed if most is None else placed[:: max(1, len(placed) // most)][:most]
 
 
 def described_cases(folder: Path) -> list[Case]:

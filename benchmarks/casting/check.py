@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Tf
 
-from benchmarks.casting.cases import Case
+from benchmarks.casting.cases import MODES, Case
 from benchmarks.casting.embree import Embree, met
 from benchmarks.casting.loader import Comparison, compare
 from benchmarks.casting.opacity import classify
@@ -26,9 +26,6 @@ from schemas.fragments import FragmentDump
 from schemas.problem import Problem
 from schemas.scene import SceneArrays
 from schemas.view import View
-
-MODES: dict[str, float | None] = {"alpha .33": 0.33, "authored": None}
-"""Opacity of every surface, by name: all transparent, so that every surface counts; and each its own."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,12 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
 
-from benchmarks.casting.check import MODES, Effort, Result
+from benchmarks.casting.cases import MODES
+from benchmarks.casting.check import Effort, Result
 from benchmarks.casting.loader import Comparison
 from benchmarks.casting.verdict import REASONS, Tally
+from benchmarks.markdown import row
+from benchmarks.provenance import said
 
 _TITLES = dict(zip(MODES, ("Every surface at opacity .33", "Opacities as authored"), strict=True))
 
@@ -89,7 +92,7 @@ def page(found: dict[str, Any], effort: Effort) -> str:
     lines = [
         "# Loader and rasteriser against ray casting",
         "",
-        f"{found['created']}, {', '.join(found['machine'].values())}. {found['driver']}.",
+        f"*{said(found)}.*",
         "",
         "```",
         found["command"],
@@ -99,7 +102,7 @@ def page(found: dict[str, Any], effort: Effort) -> str:
         "",
         *problems,
         _LOADER,
-        _row(_LOADER_COLUMNS),
+        row(_LOADER_COLUMNS),
         "|---|" + "---:|" * (len(_LOADER_COLUMNS) - 1),
         *(_loader_row(name, scene) for name, scene in scenes.items()),
         "",
@@ -116,13 +119,13 @@ def _loader_row(name: str, scene: dict[str, Any]) -> str:
     cells += [counts[key] or "" for key in ("cut", "tessellated", "beyond", "degenerate")]
     cells += ["" if scene["described triangles"] is None else scene["described triangles"]]
     cells += [counts["missing"], counts["extra"]]
-    return _row([*cells, f"{scene['load seconds']:.2f}"])
+    return row([*cells, f"{scene['load seconds']:.2f}"])
 
 
 def _ray_table(scenes: dict[str, dict[str, Any]], mode: str) -> list[str]:
     shown = REASONS[:-1]
     title = ["scene", "pixels", "fragments", "exact rays", "embree", "equal", "equal to embree", *shown]
-    rows = [_row([*title, "unexplained", "opaque", "depth error"]), "|---|" + "---:|" * (len(title) + 2)]
+    rows = [row([*title, "unexplained", "opaque", "depth error"]), "|---|" + "---:|" * (len(title) + 2)]
     for name, scene in scenes.items():
         tally = scene["rays"][mode]
         reasons = Counter(tally["reasons"])
@@ -130,9 +133,5 @@ def _ray_table(scenes: dict[str, dict[str, Any]], mode: str) -> list[str]:
         cells = [name, *(tally[key] for key in ("pixels", "fragments", "exact", "embree", "equal", "equal_embree"))]
         cells += [max(reasons[reason], embree[reason]) or "" for reason in shown]
         cells += [reasons["unexplained"], f"{tally['opaque_equal']} / {tally['pixels']}", f"{tally['error']:.1e}"]
-        rows.append(_row(cells))
+        rows.append(row(cells))
     return rows
-
-
-def _row(cells: Sequence[object]) -> str:
-    return "| " + " | ".join(str(cell) for cell in cells) + " |"

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.comparing.scenes import BUNDLE, SHARED
+from benchmarks.comparing.scenes import SHARED
 from benchmarks.predicting.labels import labels_of
 from benchmarks.predicting.store import Store
 from benchmarks.predicting.views import ViewRow, views_of
@@ -64,7 +64,7 @@ def export(store: Store, rows: list[ViewRow], network: NetworkSize, tail: TailNa
     result = train(views, (), config)
     features = np.concatenate([view.features for view in views])
     description = Description(
-        name=f"{BUNDLE}{network}",
+        name=f"suite-{network}",
         tail=TailSpec(name=tail, g=DENSITY_G),
         metric="display",
         k_min=1,

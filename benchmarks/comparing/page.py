@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from benchmarks.comparing import tables
-from benchmarks.comparing.scenes import BUNDLE
+from benchmarks.comparing.scenes import BUNDLE, PATH_FRAMES
 from schemas.bench import BenchResult, BenchView
 from services.bench.bars import error_bars
+from services.bench.cells import bundle_of
 from services.bench.groups import Group, groups_of
 from services.bench.page import said_machines
 
@@ -35,8 +36,10 @@ def page(found: Mapping[str, BenchResult], drawn: Mapping[tuple[str, str], str])
         "*certified optimum* is the least error that any allocation of the budget has with the technique's own tail. "
         "At *equal memory* each technique gets the total bytes that the fixed k-buffer takes with F = k WH, and F is "
         "what its own buffers leave of it (DHOIT, Eq. 1). Times are medians of repeats in which all techniques take "
-        "turns, on a host clock that waits for each pass; readbacks are a pass of their own. Means over views are "
-        "geometric for errors, arithmetic else.\n",
+        "turns, on a host clock that waits for each pass; readbacks are a pass of their own; the spread is the "
+        "largest of (most - least) / median. Flicker is that of `diaphane bench`, over a path of "
+        f"{PATH_FRAMES} frames. Means over views are geometric for errors, arithmetic else. `kbuffer-temporal` learns "
+        "from the frames before: it is measured at rest and in motion in [TEMPORAL.md](TEMPORAL.md).\n",
     ]
     for driver, result in found.items():
         parts += _driver(driver, result, drawn)
@@ -73,8 +76,9 @@ def _driver(driver: str, result: BenchResult, drawn: Mapping[tuple[str, str], st
     parts.append(tables.everything(first, FACTORS[0]))
     parts.append("### Where each wins\n")
     parts.append(
-        "On how many of the scenes (each opacity and size apart) a technique is on the Pareto front, and how often it "
-        "has the least error of a budget among those that a renderer can run:\n"
+        "On how many of the scenes (each opacity and size apart) a technique is on a Pareto front (no other has "
+        "less of one and no more of the rest), and how often it has the least error of a budget among those that a "
+        "renderer can run:\n"
     )
     parts.append(tables.winners(groups_of(views)))
     return parts
@@ -87,8 +91,8 @@ def _what(result: BenchResult) -> str:
     usual = max((cell.repeats for cell in cells), default=0)
     slow = {cell.technique for cell in cells if cell.repeats < usual}
     lines = [f"{len(views)} views of {len({view.scene for view in views})} scenes, {hours:.1f} h of measuring."]
-    lines.append(f"Bundle: {result.bundle}." if result.bundle else "No bundle was given: kbuffer-deep is left out.")
-    if result.bundle and result.bundle.startswith(BUNDLE):
+    lines.append(f"Bundle: {result.bundle}.")
+    if result.bundle == bundle_of(BUNDLE).label:
         lines.append("It was trained on none of these scenes (`python -m benchmarks.comparing.bundle`).")
     loads = [load for view in views for load in view.load]
     lines.append(f"Load average of the machine around a view: {min(loads):.1f} to {max(loads):.1f}.")

@@ -13,8 +13,10 @@ SHARED = ("sponza", "two_cylinder_engine", "minecraft_village_caves", "chess_set
 ALPHAS: tuple[float | None, ...] = (0.33, 0.15, None)
 """The papers' constants (DHOIT .33, DFA .15), and the materials' own. The first is that of the page's tables."""
 SIZES = ((1430, 960), (1920, 1080))
-BUNDLE = "suite-"
-"""How names of bundles begin that `benchmarks.comparing.bundle` trains on none of these scenes."""
+BUNDLE = Path(__file__).resolve().parents[1] / "bundle"
+"""What `benchmarks.comparing.bundle` made: it was trained on none of these scenes."""
+PARTS = (len(SHARED) + len(SAMPLES)) * len(ALPHAS) * len(SIZES)
+"""Of the whole suite, with those that are opaque as authored."""
 PATH_FRAMES = 3
 """Of the camera path, at the suite's first opacity and size: flicker costs as much as everything else there."""
 

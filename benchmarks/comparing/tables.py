@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
+from benchmarks.markdown import table
 from schemas.bench import Basis, BenchView
 from services.bench.groups import (
     ORACLE_WORDS,
@@ -16,7 +18,6 @@ from services.bench.groups import (
     said_technique,
     title_of,
 )
-from services.report.charts import pareto_front
 from services.summary import geometric_mean, number
 
 FEATURES, IMPORTANCE, BUFFER, READBACK = "feature extraction", "importance", "k-buffer", "readback"
@@ -24,12 +25,6 @@ STAGES = (FEATURES, IMPORTANCE, BUFFER, READBACK)
 """DHOIT's stages (Table 1), and what it does not time."""
 _BUFFER = {"opaque", "count", "prefix", "chain", "chain-depth", "chain-colour", "resolve"}
 NOT_MEASURED = "–"
-
-
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A Markdown table."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 def stage_of(name: str) -> str:
@@ -85,6 +80,7 @@ def scores(views: Sequence[BenchView]) -> str:
     factors = sorted({row.key.budget_factor for row in whole.rows if row.key.budget_factor})
     head = ["technique"]
     head += [f"F = {f:g} WH" for f in factors] + ["worst"] + [f"M of k = {f:g}" for f in factors]
+    head.append("over the certified optimum, F = " + " / ".join(f"{f:g}" for f in factors) + " WH")
     lines = []
     for name in _names([whole], "fragments"):
         of = [row for row in whole.rows if said_technique(row.key) == name]
@@ -93,7 +89,9 @@ def scores(views: Sequence[BenchView]) -> str:
         memory: Basis = "memory" if any(row.key.basis == "memory" for row in of) else "fragments"
         worst = _worst(views, [row for row in of if row.key.basis == "fragments"])
         equal = [number(by.get(("fragments", f))) for f in factors]
-        lines.append([name, *equal, worst, *(number(by.get((memory, f))) for f in factors)])
+        optimum = {row.key.budget_factor: row.over_optimum for row in of if row.key.basis == "fragments"}
+        over = " / ".join(number(optimum.get(f)) for f in factors)
+        lines.append([name, *equal, worst, *(number(by.get((memory, f))) for f in factors), over])
     return table(head, lines)
 
 
@@ -120,6 +118,7 @@ def everything(views: Sequence[BenchView], factor: float) -> str:
     head = (
         "technique",
         "frame, ms",
+        "spread",
         "bytes / pixel",
         "total, MiB",
         "MSE ×1e-5",
@@ -134,6 +133,7 @@ def everything(views: Sequence[BenchView], factor: float) -> str:
             [
                 said_technique(row.key),
                 number(row.ms),
+                NOT_MEASURED if row.spread is None else f"{100.0 * row.spread:.0f} %",
                 NOT_MEASURED if row.pixel_bytes is None else str(row.pixel_bytes),
                 NOT_MEASURED if row.total_bytes is None else f"{row.total_bytes / 2**20:.1f}",
                 "exact" if row.family == "exact" else _e5(row.mse),
@@ -148,23 +148,42 @@ def everything(views: Sequence[BenchView], factor: float) -> str:
 
 
 def winners(groups: Sequence[Group]) -> str:
-    """How often each technique is on the Pareto front of a scene: time against error, bytes against error."""
-    in_time, in_bytes, least = Counter[str](), Counter[str](), Counter[str]()
-    fronts = 0
+    """On how many scenes each technique is on a Pareto front, and how often it has the least error of a budget.
+
+    Where several have the least error, as where all are lossless, each of them counts.
+    """
+    fronts = {"time, error": (_time,), "bytes, error": (_bytes,), "time, bytes, error": (_time, _bytes)}
+    found = {name: Counter[str]() for name in fronts}
+    least = Counter[str]()
     for each in groups:
         rows = [*measured(each.rows, "none"), *measured(each.rows, "fragments")]
         rows = [row for row in rows if row.is_runnable and (row.family == "exact" or row.mse is not None)]
-        fronts += 1
-        for counter, cost in ((in_time, "ms"), (in_bytes, "total_bytes")):
-            points = {(getattr(r, cost), r.mse or 0.0): said_technique(r.key) for r in rows if getattr(r, cost)}
-            counter.update({points[point] for point in pareto_front(list(points))})
+        for name, costs in fronts.items():
+            points = [(*(cost(row) for cost in costs), row.mse or 0.0) for row in rows]
+            found[name].update(
+                {said_technique(row.key) for row, at in zip(rows, points, strict=True) if _on(at, points)}
+            )
         for factor in {row.key.budget_factor for row in rows if row.key.basis == "fragments"}:
             bounded = [row for row in rows if row.key.basis == "fragments" and row.key.budget_factor == factor]
-            if bounded:
-                least[said_technique(min(bounded, key=lambda row: row.mse or 0.0).key)] += 1
-    names = sorted({*in_time, *in_bytes, *least}, key=lambda name: (-in_time[name] - in_bytes[name], name))
-    head = ("technique", f"time and error, of {fronts}", f"bytes and error, of {fronts}", "least error of a budget")
-    return table(head, [[name, str(in_time[name]), str(in_bytes[name]), str(least[name])] for name in names])
+            best = min(row.mse or 0.0 for row in bounded)
+            least.update(said_technique(row.key) for row in bounded if (row.mse or 0.0) == best)
+    total = sum(found.values(), least)
+    names = sorted(total, key=lambda name: (-total[name], name))
+    lines = [[name, *(count[name] for count in found.values()), least[name]] for name in names]
+    return table(("technique", *(f"{name}, of {len(groups)}" for name in fronts), "least error of a budget"), lines)
+
+
+def _time(row: Row) -> float:
+    return math.inf if row.ms is None else row.ms
+
+
+def _bytes(row: Row) -> float:
+    return math.inf if row.total_bytes is None else row.total_bytes
+
+
+def _on(point: Sequence[float], points: Sequence[Sequence[float]]) -> bool:
+    """Whether no other point is at most as much in everything and less in something."""
+    return not any(other != point and all(a <= b for a, b in zip(other, point, strict=True)) for other in points)
 
 
 def scene_of(each: Group) -> str:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import statistics
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from benchmarks import markdown
 from benchmarks.labelling.certified import MOST_GAP
 from benchmarks.labelling.plot import Labels, log_log
+from benchmarks.provenance import said, said_load
 
 _TIME_PLOT, _MEMORY_PLOT = "labeller-time.svg", "labeller-memory.svg"
 Found = Mapping[str, Any]
@@ -38,7 +41,7 @@ def plots(found: Found) -> dict[str, str]:
     if "linear" not in found:
         return {}
     costs = found["linear"]["found"]["costs"]
-    time = {name: [(c["fragments"], _median(c["seconds"])) for c in group] for name, group in _kinds(costs)}
+    time = {name: [(c["fragments"], statistics.median(c["seconds"])) for c in group] for name, group in _kinds(costs)}
     memory = {name: [(c["fragments"], max(c["peak_bytes"], 1) / 2**20) for c in group] for name, group in _kinds(costs)}
     memory["the dump itself"] = [(c["fragments"], c["dump_bytes"] / 2**20) for c in costs if c["rule"] == "optimal"]
     return {
@@ -51,17 +54,13 @@ def plots(found: Found) -> dict[str, str]:
 
 
 def _circumstances(part: Found) -> str:
-    machine, load = part["machine"], part["load_average"]
     quick = " Tiny views: this run only shows that it works." if part["quick"] else ""
-    return (
-        f"*{machine['processor']}, {machine['cores']} cores, {machine['memory']}; {part['created']}; load average "
-        f"{load['before']:.1f} before and {load['after']:.1f} after.{quick}*\n"
-    )
+    return f"*{said(part)}; {said_load(**part['load_average'])}.{quick}*\n"
 
 
 def _certified(found: Found) -> str:
     scenes = found["scenes"]
-    table = _table(
+    table = markdown.table(
         ("scene", "stages", "views", "most fragments", "cases", "proven", "worst gap", "greedy", "increment"),
         (
             (
@@ -112,7 +111,7 @@ def _ratio(value: float | None) -> str:
 def _speed(found: Found) -> str:
     views, copy = found["views"], found["copy_bytes_per_s"]
     names = ("curves", "hulls", "one budget", "five budgets", "all", "curves and greedy")
-    times = _table(
+    times = markdown.table(
         ("view", "fragments", *names, "memory", "memory / dump"),
         (
             (
@@ -125,7 +124,7 @@ def _speed(found: Found) -> str:
             for row in views
         ),
     )
-    moved = _table(
+    moved = markdown.table(
         ("view", "step", "MiB read", "MiB written", "GB/s", "share of the copy's"),
         (_moved(row["view"], name, sides, row["times"], copy) for row in views for name, sides in _steps(row)),
     )
@@ -166,7 +165,7 @@ def _heaps(rows: Sequence[Found]) -> str:
                     "" if name == "greedy" else "yes" if row["equal"][name] else "**no**",
                 )
             )
-    table = _table(("view", "five budgets by", "ms", "over `greedy`", "with the curves", "equal k"), lines)
+    table = markdown.table(("view", "five budgets by", "ms", "over `greedy`", "with the curves", "equal k"), lines)
     removals = ", ".join(f"{row['removals']:,} of {row['fragments']:,}" for row in rows)
     return (
         "## `greedy` against heaps\n\nAlgorithm 1 for five budgets: a heap removes one fragment after the other "
@@ -179,15 +178,15 @@ def _heaps(rows: Sequence[Found]) -> str:
 
 
 def _linear(found: Found) -> str:
-    table = _table(
+    table = markdown.table(
         ("rule", "bands", "fragments", "s", "ns a fragment", "MiB", "of them k", "MiB / dump", "a band's dump, MiB"),
         (
             (
                 c["rule"],
                 str(c["bands"]) if c["banded"] else "",
                 f"{c['fragments']:,}",
-                f"{_median(c['seconds']):.3g}",
-                f"{1e9 * _median(c['seconds']) / c['fragments']:.0f}",
+                f"{statistics.median(c['seconds']):.3g}",
+                f"{1e9 * statistics.median(c['seconds']) / c['fragments']:.0f}",
                 f"{c['peak_bytes'] / 2**20:.0f}",
                 f"{4 * len(c['gaps']) * c['pixels'] / 2**20:.0f}",
                 f"{c['peak_bytes'] / c['dump_bytes']:.2f}",
@@ -215,7 +214,7 @@ def _linear(found: Found) -> str:
 
 def _several_g(rows: Sequence[Found]) -> str:
     names = ("one", "1 at once", "2 at once", "4 at once", "8 at once")
-    table = _table(
+    table = markdown.table(
         ("view", *names, "8 over one"),
         (
             (
@@ -235,7 +234,7 @@ def _several_g(rows: Sequence[Found]) -> str:
 def _metrics(rows: Sequence[Found]) -> str:
     metrics = list(dict.fromkeys(name.partition(", ")[2] for name in rows[0]["times"])) if rows else []
     tails = list(dict.fromkeys(name.partition(", ")[0] for name in rows[0]["times"])) if rows else []
-    table = _table(
+    table = markdown.table(
         ("view", "tail", *metrics),
         (
             (row["view"], tail, *(_both(row["times"][f"{tail}, {metric}"]) for metric in metrics))
@@ -263,19 +262,9 @@ def _kinds(costs: Sequence[Found]) -> list[tuple[str, list[Found]]]:
     return list(kinds.items())
 
 
-def _median(values: Sequence[float]) -> float:
-    ordered = sorted(values)
-    return 0.5 * (ordered[(len(ordered) - 1) // 2] + ordered[len(ordered) // 2])
-
-
 def _both(times: Found) -> str:
     return f"{_ms(times['median'])} ({_ms(times['least'])})"
 
 
 def _ms(value: float) -> str:
     return f"{value:,.0f}" if value >= 10.0 else f"{value:.2g}"
-
-
-def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)

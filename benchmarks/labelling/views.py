@@ -5,24 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from benchmarks.casting.cases import Case
+from benchmarks.casting.cases import MODES, Case
 from renderer.capture import capture
 from renderer.context import gl_context
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.scene import LoadOptions, load_scene
-from renderer.views import listed_views, placed_views, sampled_views
 from schemas.fragments import FragmentDump
 from schemas.problem import Problem
-from schemas.scene import SceneArrays
-from schemas.view import View
 
 SIZE = (1430, 960)
-MODES: dict[str, float | None] = {"alpha .33": 0.33, "authored": None}
-"""Opacity of every surface: one for all, so that opaque scenes count as well; and each its own."""
-_SAMPLED = 2
-"""Views of a stage for which none are listed."""
-_SEED = 11
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,15 +65,7 @@ def captured_views(
             yield CapturedView(case.scene, stage, mode, "", None, "nothing in it is transparent")
             continue
         gpu = GpuScene(gl_context(), scene)
-        for view in _cameras(case, scene, most):
+        for view in case.cameras(scene, most):
             if (case.scene, stage, mode, view.name) not in known:
                 dump = capture(Frame(gpu, view, *size)).dump
                 yield CapturedView(case.scene, stage, mode, view.name, dump)
-
-
-def _cameras(case: Case, scene: SceneArrays, most: int | None) -> tuple[View, ...]:
-    listed = listed_views(case.views, case.path) if case.views is not None else ()
-    if not listed:
-        return sampled_views(scene, _SAMPLED if most is None else min(most, _SAMPLED), _SEED)
-    placed = placed_views(listed, scene)
-    return placed if most is None else placed[:: max(1, len(placed) // most)][:most]

@@ -32,6 +32,12 @@ class Tally:
         """Notes one that did not."""
         self.errors[f"{operation}: {what}"] += 1
 
+    def add(self, other: Tally) -> None:
+        """Adds what another one noted of other operations."""
+        self.seconds.update(other.seconds)
+        self.bytes.update(other.bytes)
+        self.errors.update(other.errors)
+
     def figures(self, duration: float) -> dict[str, Any]:
         """Figures of each operation, milliseconds, and the errors.
 

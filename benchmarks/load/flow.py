@@ -57,10 +57,7 @@ def run_flowing(port: int, seed: Seed, plan: Plan) -> tuple[Tally, dict[str, Any
         reads = pool.submit(run, traffic.read_all, port, seed, plan.mix, plan.seconds)
         others = pool.submit(run, _submit_and_listen, port, seed, plan)
         tally, counts = others.result()
-        part = reads.result()
-    tally.seconds.update(part.seconds)
-    tally.bytes.update(part.bytes)
-    tally.errors.update(part.errors)
+        tally.add(reads.result())
     return tally, counts
 
 

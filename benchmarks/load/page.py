@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from benchmarks.markdown import row
+from benchmarks.provenance import said, said_load
+
 Figures = Mapping[str, Any]
 
 
@@ -23,11 +26,8 @@ def page(found: Figures) -> str:
 
 
 def _head(found: Figures) -> Iterator[str]:
-    machine = found["machine"]
     yield (
-        f"{found['created']}, {machine['processor']}, {machine['cores']} cores, {machine['memory']}, "
-        f"Python {found['versions']['python']}. Server and clients share the machine; load average "
-        f"{_loads(found['load_average']['before'])} before and {_loads(found['load_average']['after'])} after."
+        f"*{said(found)}; {_load(found)}.* Python {found['versions']['python']}; server and clients share the machine."
     )
     yield ""
     yield "Errors in all: " + str(found["errors"]) + "."
@@ -52,7 +52,7 @@ def _blobs(blobs: Figures) -> Iterator[str]:
     yield "|---|---:|---:|---:|---:|---:|"
     for name, figures in blobs["mib_per_second"].items():
         share = blobs["share"].get(name, {"median": "", "least": ""})
-        yield _row(name, figures["median"], figures["least"], figures["most"], share["median"], share["least"])
+        yield row((name, figures["median"], figures["least"], figures["most"], share["median"], share["least"]))
     small = blobs["parallel_64_kib"]
     yield ""
     yield f"{small['bytes'] >> 10} KiB over {small['connections']} connections at once; requests a second:"
@@ -60,7 +60,7 @@ def _blobs(blobs: Figures) -> Iterator[str]:
     yield "| server | median | least | most |"
     yield "|---|---:|---:|---:|"
     for name, figures in small["per_second"].items():
-        yield _row(name, figures["median"], figures["least"], figures["most"])
+        yield row((name, figures["median"], figures["least"], figures["most"]))
     yield ""
     yield _when(blobs)
     if "note" in blobs:
@@ -76,7 +76,7 @@ def _ready(ready: Figures) -> Iterator[str]:
     for name in ("new", "old"):
         figures = ready[f"{name}_state"]
         every = " ".join(f"{seconds:.2f}" for seconds in figures["seconds"])
-        yield _row(name, figures["median_seconds"], figures["median_cpu_seconds"], every)
+        yield row((name, figures["median_seconds"], figures["median_cpu_seconds"], every))
     yield ""
     imports = ready["imports"]
     dearest = ", ".join(f"{name} {ms:.0f}" for name, ms in list(imports["packages_ms"].items())[:12])
@@ -108,17 +108,13 @@ def _run(run: Figures) -> Iterator[str]:
     yield "|---|---:|---:|---:|---:|---:|---:|"
     for name, figures in run["operations"].items():
         keys = ("count", "per_second", "p50_ms", "p95_ms", "p99_ms", "max_ms")
-        yield _row(name, *(figures[key] for key in keys))
-
-
-def _row(*cells: object) -> str:
-    return "| " + " | ".join(str(cell) for cell in cells) + " |"
+        yield row((name, *(figures[key] for key in keys)))
 
 
 def _when(part: Figures) -> str:
+    return f"Measured {part['created']}; {_load(part)}."
+
+
+def _load(part: Figures) -> str:
     load = part["load_average"]
-    return f"Measured {part['created']}, load average {load['before'][0]:.1f} before, {load['after'][0]:.1f} after."
-
-
-def _loads(values: Any) -> str:
-    return ", ".join(f"{value:.1f}" for value in values)
+    return said_load(load["before"][0], load["after"][0])

@@ -141,9 +141,7 @@ def _collect(
 ) -> tuple[Tally, dict[str, Any]]:
     tally, submitted, ended = others.result()
     for part in (reads.result(), writes.result()):
-        tally.seconds.update(part.seconds)
-        tally.bytes.update(part.bytes)
-        tally.errors.update(part.errors)
+        tally.add(part)
     queued = asyncio.run(_queued(port, seed))
     missing = set(submitted) - {job["id"] for job in queued}
     if missing or len(set(submitted)) != plan.jobs:

@@ -17,6 +17,8 @@ from benchmarks.load.http import HOST
 
 START = "import sys; sys.argv[0] = 'diaphane'; from services.cli import main; main()"
 SAMPLE_SECONDS = 0.5
+UNLIMITED = {"DIAPHANE_RATE": "1000000", "DIAPHANE_BURST": "1000000"}
+"""Environment of a service whose load comes from one key."""
 _STOP_SECONDS = 40.0
 _TICKS = os.sysconf("SC_CLK_TCK")
 

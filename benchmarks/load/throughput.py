@@ -201,19 +201,14 @@ def _each(values: dict[str, list[float]]) -> dict[str, dict[str, float]]:
     return {name: _summary(found) for name, found in values.items()}
 
 
-def _summary(values: Sequence[float]) -> dict[str, float]:
+def _summary(values: Sequence[float], digits: int = 1) -> dict[str, float]:
     return {
-        "median": round(statistics.median(values), 1),
-        "least": round(min(values), 1),
-        "most": round(max(values), 1),
+        "median": round(statistics.median(values), digits),
+        "least": round(min(values), digits),
+        "most": round(max(values), digits),
     }
 
 
 def _ratios(ours: Sequence[float], theirs: Sequence[float]) -> dict[str, float]:
     """Round by round, so that whatever else the machine does falls on both."""
-    ratios = [mine / other for mine, other in zip(ours, theirs, strict=True)]
-    return {
-        "median": round(statistics.median(ratios), 3),
-        "least": round(min(ratios), 3),
-        "most": round(max(ratios), 3),
-    }
+    return _summary([mine / other for mine, other in zip(ours, theirs, strict=True)], 3)

@@ -6,9 +6,11 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
+from benchmarks import markdown
 from benchmarks.labelling.plot import Labels, Points, log_log
 from benchmarks.predicting.summary import cost_of, front, score
 from benchmarks.predicting.variants import DEFAULT
+from benchmarks.provenance import said
 
 Found = Mapping[str, Any]
 
@@ -175,7 +177,7 @@ def _sizes(variants: Mapping[str, Found], file: str) -> str:
         "tail keeps of a pixel anyway), `small` (leaves out the sums that gain nothing beside depth bins) and `full` "
         f"(reads all).\n\n{drawn}\n\n"
         "No other variant of the product is at least as good as one of these in multiply-adds, bytes while gathering "
-        f"and score:\n\n{_table(_COLUMNS, (_row(name, shipped[name]) for name in chosen))}"
+        f"and score:\n\n{markdown.table(_COLUMNS, (_row(name, shipped[name]) for name in chosen))}"
     )
 
 
@@ -188,7 +190,7 @@ def _parts(variants: Mapping[str, Found]) -> str:
             continue
         bases = {row["base"]: None for row in rows.values() if row["base"] in variants and row["base"] not in rows}
         listed = {**{name: variants[name] for name in bases}, **rows}
-        table = _table(
+        table = markdown.table(
             (*_COLUMNS, "against", "change"),
             ((*_row(name, row), *_change(row, variants, spread)) for name, row in listed.items()),
         )
@@ -206,7 +208,7 @@ def _flip(rows: Mapping[str, Found]) -> str:
         return ""
     heads = ("mean FLIP over that of", "", "x1", "x2", "x4")
     cells = ((row["base"], name, *_numbers(row["flip / base"])) for name, row in known.items())
-    return f"\n{_table(heads, cells)}"
+    return f"\n{markdown.table(heads, cells)}"
 
 
 def _spread(variants: Mapping[str, Found]) -> float | None:
@@ -248,7 +250,7 @@ def _row(name: str, row: Found) -> tuple[str, ...]:
 
 
 def _rules(rules: Sequence[Found]) -> str:
-    table = _table(
+    table = markdown.table(
         ("tail", "rule", "q x1", "x2", "x4", "score", "at memory x1", "x2", "x4", "gather", "capture", "worst q"),
         (
             (
@@ -271,7 +273,7 @@ def _rules(rules: Sequence[Found]) -> str:
 
 
 def _tails(tails: Sequence[Found]) -> str:
-    table = _table(
+    table = markdown.table(
         ("tail", "bytes", "optimum x1", "x2", "x4", "proportional x1", "x2", "x4"),
         (
             (row["name"], f"{row['bytes']:g}", *_numbers(row["optimal"]), *_numbers(row["proportional"]))
@@ -293,7 +295,7 @@ def _assets(variants: Mapping[str, Found], names: Sequence[str]) -> str:
         for asset in sorted(assets, key=lambda asset: -score(assets[asset]))
     )
     heads = [f"{name} x{multiple}" for name in names for multiple in (1, 2, 4)]
-    return f"## Every asset, held out\n\nWorst first, by `{names[0]}`.\n\n{_table(('asset', *heads), rows)}"
+    return f"## Every asset, held out\n\nWorst first, by `{names[0]}`.\n\n{markdown.table(('asset', *heads), rows)}"
 
 
 def _options(setting: Found) -> str:
@@ -303,12 +305,12 @@ def _options(setting: Found) -> str:
 
 
 def _circumstances(found: Found) -> str:
-    about, machine = found["setting"], found["machine"]
+    about = found["setting"]
     width, height = about["size"]
     return (
         f"{about['assets']} assets, {about['views']} views at {width}x{height} (at most {about['most']} of a stage and "
-        f"mode: opacity .33 of every surface, and the scene's own), {about['folds']} folds. *{machine['processor']}, "
-        f"{machine['cores']} cores, {machine['memory']}; {found['created']}.*\n"
+        f"mode: opacity .33 of every surface, and the scene's own), {about['folds']} folds. "
+        f"*{said(found)}.*\n"
     )
 
 
@@ -324,8 +326,3 @@ def _number(value: float | None) -> str:
     if value is None or math.isnan(value):
         return "-"
     return f"{value:.3f}" if value < 1.0 else f"{value:.2f}" if value < 10.0 else f"{value:.0f}"
-
-
-def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    lines = ["| " + " | ".join(heads) + " |", "|" + " --- |" * len(heads)]
-    return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)]) + "\n"

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
+
+from benchmarks import markdown
+from benchmarks.provenance import said, said_load
 
 
 def page(found: Mapping[str, Any]) -> str:
@@ -11,7 +14,7 @@ def page(found: Mapping[str, Any]) -> str:
     before, after = (found["load_average"][when][0] for when in ("before", "after"))
     parts = [
         "# The renderer, measured\n",
-        f"{found['driver']}. {found['created']}; load average {before:.1f} before and {after:.1f} after. "
+        f"*{said(found)}; {said_load(before, after)}.* "
         "1430x960, milliseconds on the wall clock, medians of rounds in which everything takes its turn. "
         "All techniques against each other, on more scenes: [BENCH.md](BENCH.md).\n",
         f"```\n{found['command']}\n```\n",
@@ -22,7 +25,7 @@ def page(found: Mapping[str, Any]) -> str:
 
 
 def _capture(rows: list[dict[str, Any]]) -> str:
-    table = _table(
+    table = markdown.table(
         ("scene", "triangles", "fragments", "empty pass", "capture", "ratio", "least ratio", "M fragments/s", "passes"),
         (
             (
@@ -53,7 +56,7 @@ def _capture(rows: list[dict[str, Any]]) -> str:
 
 
 def _views(rows: list[dict[str, Any]]) -> str:
-    table = _table(
+    table = markdown.table(
         ("scene", "load", "upload", "second view", "its capture alone", "with a new upload"),
         (
             (
@@ -72,7 +75,7 @@ def _views(rows: list[dict[str, Any]]) -> str:
 
 
 def _learned(rows: list[dict[str, Any]]) -> str:
-    table = _table(
+    table = markdown.table(
         ("scene", "network in", "frame", "kbuffer-importance", "difference", "ratio", "passes"),
         (
             (
@@ -92,11 +95,6 @@ def _learned(rows: list[dict[str, Any]]) -> str:
         "## The price of learning\n\n`kbuffer-deep` minus `kbuffer-importance` at F = 2 W H: features, inference and "
         f"lambda against one importance map.\n\n{table}"
     )
-
-
-def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    lines = [head, tuple("---" for _ in head), *rows]
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
 def _passes(passes: Mapping[str, float]) -> str:

@@ -11,13 +11,13 @@ from pathlib import Path
 import moderngl
 import numpy as np
 
+from benchmarks.casting.cases import SHARED
 from benchmarks.render.thicket import thicket
 from renderer.gpu_scene import GpuScene
 from renderer.scene import LoadOptions, load_scene
 from renderer.views import listed_views, placed_views, sampled_views
 from schemas.view import View
 
-SHARED = Path(__file__).parents[2].parent / "shared" / "scenes"
 MANIFEST = SHARED / "MANIFEST.json"
 SPONZA = SHARED / "sponza" / "sponza.usdc"
 ALPHA = 0.33

@@ -13,6 +13,7 @@ from benchmarks.forgetting import NEW, OLD, SETTINGS, measure, page
 from schemas.job import JobSpec
 from schemas.problem import Problem
 
+MACHINE = {"processor": "Abacus", "cores": "2", "memory": "1 GiB"}
 SCENES = {name: f"scn_{number:032x}" for number, name in enumerate((*OLD, NEW))}
 
 
@@ -67,7 +68,7 @@ def test_versions_differ_in_what_they_begin_with_and_replay_and_are_measured_ali
 
 def test_the_page_has_a_row_for_each_version_with_the_mean_of_the_old_scenes() -> None:
     rows = measure(Server(), SCENES, 7)
-    about = {"command": "python -m benchmarks.forgetting", "created": "now", "machine": {"cores": "2"}}
+    about = {"command": "python -m benchmarks.forgetting", "created": "now", "machine": MACHINE}
     text = page({**about, "old": list(OLD), "new": NEW, "settings": {**SETTINGS, "steps": 7}, "rows": rows})
     cells = [line.strip("| ").split(" | ") for line in text.splitlines() if re.search(r"\d\.\d{3}", line)]
     assert [row[0] for row in cells] == [row["title"] for row in rows]
