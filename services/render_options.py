@@ -121,6 +121,19 @@ def parse_techniques(names: Sequence[str], has_bundle: bool) -> tuple[str, ...]:
     return tuple(dict.fromkeys(found))
 
 
+def said_left_out(names: Sequence[str], has_bundle: bool) -> str | None:
+    """A sentence on what `all` leaves out, if anything.
+
+    Args:
+        names: As of `parse_techniques`.
+        has_bundle: Whether a bundle is given.
+    """
+    if has_bundle or EVERY not in ",".join(names).split(","):
+        return None
+    missing = [name for name, entry in TECHNIQUES.items() if entry.needs_bundle]
+    return f"{' and '.join(missing)} are left out: give a bundle with --bundle."
+
+
 def parse_times(frames: str | None, default_time: bool) -> tuple[float, ...]:
     """Time codes of `--frames`, or not a number for `--defaultTime`; empty for neither.
 

@@ -92,7 +92,7 @@ def bench(
     from services.bench.groups import group, groups_of
     from services.bench.options import BenchOptions, parse_alphas, parse_budgets, parse_sizes, parse_tails
     from services.progress import make_progress
-    from services.render_options import parse_needs, parse_refine, parse_techniques
+    from services.render_options import parse_needs, parse_refine, parse_techniques, said_left_out
 
     options = BenchOptions(
         scenes=tuple(files),
@@ -135,6 +135,6 @@ def bench(
         show(each)
     if note := check_same_code(result):
         progress.note(note)
-    if "kbuffer-deep" not in options.techniques and techniques == "all":
-        progress.note("kbuffer-deep and kbuffer-temporal are left out: give a bundle with --bundle.")
+    if note := said_left_out([techniques], bundle is not None):
+        progress.note(note)
     print(out / "index.html")

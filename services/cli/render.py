@@ -98,6 +98,7 @@ def render(
         parse_refine,
         parse_techniques,
         parse_times,
+        said_left_out,
     )
 
     options = RenderOptions(
@@ -122,11 +123,13 @@ def render(
     )
     from services.rendering import render as run
 
-    pictures = []
-    for picture in run(options, make_progress(sys.stderr, silent=as_json)):
+    pictures, progress = [], make_progress(sys.stderr, silent=as_json)
+    for picture in run(options, progress):
         pictures.append(picture)
         if not as_json:
             _show(picture)
+    if note := said_left_out(techniques or (), bundle is not None):
+        progress.note(note)
     if as_json:
         output.print_json({"pictures": [picture.json() for picture in pictures]})
 

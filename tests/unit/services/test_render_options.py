@@ -19,6 +19,7 @@ from services.render_options import (
     parse_techniques,
     parse_times,
     parse_vkb,
+    said_left_out,
 )
 
 
@@ -36,6 +37,15 @@ def test_techniques_come_by_name_in_lists_or_all() -> None:
 def test_a_technique_without_a_name_is_refused(names: tuple[str, ...]) -> None:
     with pytest.raises(Problem, match="No technique is named"):
         parse_techniques(names, False)
+
+
+def test_all_says_what_it_leaves_out_without_a_bundle() -> None:
+    for names in (["all"], ["kbuffer,all"]):
+        said = said_left_out(names, has_bundle=False) or ""
+        for name in set(TECHNIQUES) - set(parse_techniques(names, has_bundle=False)):
+            assert name in said
+        assert said_left_out(names, has_bundle=True) is None
+    assert said_left_out(["kbuffer"], has_bundle=False) is None
 
 
 def test_complexity_is_levels_of_refinement() -> None:
