@@ -153,6 +153,25 @@ def test_wgsl_in_float16_rounds_as_its_twin_in_numpy(compared: Compared) -> None
     assert compared.scaled(WGSL_HALF, half_outputs(WEIGHTS, compared.inputs)) <= 1e-5
 
 
+@pytest.mark.skipif(shutil.which("dxc") is None, reason="there is no dxc in the PATH: DirectX Shader Compiler")
+def test_hlsl_agrees_with_torch_by_the_compiler_of_direct3d(compared: Compared, tmp_path: Path) -> None:
+    source = tmp_path / HLSL
+    source.write_text((compared.folder / HLSL).read_text() + HLSL_MAIN)
+    # Direct3D 12 reads DXIL, of which this checks that it is made without a warning; SPIR-V is what can run here.
+    dxc("cs_6_0", "-WX", source, tmp_path / "dxil")
+    binary = dxc("cs_6_2", "-spirv", source, tmp_path / "spirv")
+    found = webgpu.run(tmp_path, {HLSL: webgpu.Shader(binary, 2)}, compared.inputs)[HLSL]
+    assert 0.0 < (np.abs(found - compared.truth) / np.maximum(1.0, np.abs(compared.truth))).max() <= 1e-5
+
+
+def dxc(profile: str, option: str, source: Path, target: Path) -> bytes:
+    """A compute shader in HLSL, compiled by DXC."""
+    command = ["dxc", "-T", profile, "-E", "main", option, str(source), "-Fo", str(target)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-3000:]
+    return target.read_bytes()
+
+
 def test_wgsl_makes_the_features_of_the_self_test(compared: Compared, tmp_path: Path) -> None:
     test = load_manifest(compared.folder).self_test
     assert test is not None
