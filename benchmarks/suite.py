@@ -19,6 +19,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
+from benchmarks.casting.cases import SHARED as FOLDER
 from benchmarks.comparing.page import page, pictures
 from benchmarks.comparing.scenes import ALPHAS, BUNDLE, PARTS, SHARED, SIZES, Part, cases_of, parts_of
 from renderer.context import describe, gl_context
@@ -156,7 +157,7 @@ def _tell(progress: Progress, part: Part, number: int, total: int, seconds: floa
 
 def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", type=Path, default=ROOT.parent / "shared" / "scenes", help="with MANIFEST.json")
+    parser.add_argument("--scenes", type=Path, default=FOLDER, help="with MANIFEST.json")
     parser.add_argument("--only", help="names of scenes, with commas: a part of the suite")
     parser.add_argument("--alpha", dest="alphas", type=parse_alphas, default=ALPHAS, help="as of diaphane bench")
     parser.add_argument("--size", dest="sizes", type=parse_sizes, default=SIZES, help="as of diaphane bench")
