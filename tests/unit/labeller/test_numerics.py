@@ -26,8 +26,9 @@ def fitted(function: Callable[[NDArray[np.float64]], NDArray[np.float64]], first
 def test_the_coefficients_are_those_of_the_fits() -> None:
     display = fitted(lambda q: 1.055 * q ** (10 / 3) - 0.055, LEAST_ROOT, 1.0)
     exponential = fitted(lambda x: np.exp(-x), 0.0, MAX_EXPONENT / 64)
-    np.testing.assert_allclose(numerics._DISPLAY, display, rtol=0.0, atol=1e-14)
-    np.testing.assert_allclose(numerics._EXPONENTIAL, exponential, rtol=0.0, atol=1e-14)
+    # A processor's own linear algebra rounds the fit its own way: 1.3e-14 were seen.
+    np.testing.assert_allclose(numerics._DISPLAY, display, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(numerics._EXPONENTIAL, exponential, rtol=0.0, atol=1e-13)
 
 
 def test_display_values_are_those_of_the_standard() -> None:
