@@ -25,6 +25,8 @@ STAGES = (FEATURES, IMPORTANCE, BUFFER, READBACK)
 """DHOIT's stages (Table 1), and what it does not time."""
 _BUFFER = {"opaque", "count", "prefix", "chain", "chain-depth", "chain-colour", "resolve"}
 NOT_MEASURED = "–"
+_ALIKE = 1.05
+"""Times the least error that counts as the least."""
 
 
 def stage_of(name: str) -> str:
@@ -171,6 +173,23 @@ def winners(groups: Sequence[Group]) -> str:
     names = sorted(total, key=lambda name: (-total[name], name))
     lines = [[name, *(count[name] for count in found.values()), least[name]] for name in names]
     return table(("technique", *(f"{name}, of {len(groups)}" for name in fronts), "least error of a budget"), lines)
+
+
+def losses(groups: Sequence[Group], name: str) -> str:
+    """Where another technique that a renderer can run has the least error of a budget, by more than `_ALIKE`."""
+    lost: list[tuple[float, tuple[str, ...]]] = []
+    for each in groups:
+        rows = [row for row in measured(each.rows, "fragments") if row.is_runnable and row.mse is not None]
+        for factor in sorted({row.key.budget_factor or 0.0 for row in rows}):
+            found = {said_technique(row.key): row for row in rows if row.key.budget_factor == factor}
+            best = min(found, key=lambda one: found[one].mse or 0.0)
+            least, own = found[best], found.get(name)
+            if own is not None and (own.mse or 0.0) > _ALIKE * (least.mse or 0.0):
+                over = (own.mse or 0.0) / (least.mse or 1.0)
+                line = (each.title, f"{factor:g} WH", _e5(own.mse), best, _e5(least.mse), number(over))
+                lost.append((over, line))
+    head = ("scene", "F", f"MSE ×1e-5 of {name}", "least by", "MSE ×1e-5", "times")
+    return table(head, (line for _, line in sorted(lost, reverse=True))) if lost else "Nowhere.\n"
 
 
 def _time(row: Row) -> float:
