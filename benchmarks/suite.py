@@ -27,11 +27,11 @@ from renderer.techniques import TECHNIQUES as technique_entries
 from schemas.bench import BenchResult, BenchView
 from services.bench.cells import bundle_of
 from services.bench.files import write_files
+from services.bench.groups import said_alpha
 from services.bench.kept import ROWS, Kept
 from services.bench.options import BenchOptions, parse_alphas, parse_sizes
 from services.bench.run import bench, result_of
 from services.progress import Progress, make_progress
-from services.render_options import parse_techniques
 from services.versions import machine
 from services.writing import replacing
 
@@ -39,7 +39,7 @@ ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
 PAGE = ROOT / "benchmarks" / "BENCH.md"
 COMMAND = "make bench"
-TECHNIQUES = [name for name, entry in technique_entries.items() if entry.settles == 1]
+TECHNIQUES = tuple(name for name, entry in technique_entries.items() if entry.settles == 1)
 """Those that a still frame shows. `kbuffer-temporal` learns from frames: it is measured by `benchmarks.temporal`."""
 _QUICK = {"sizes": ((320, 214),), "alphas": (0.33,), "scenes": ("sponza", "bottles")}
 
@@ -136,7 +136,7 @@ def plain_path(line: str) -> str:
 def _options(part: Part, arguments: argparse.Namespace, work: Path) -> BenchOptions:
     return BenchOptions(
         scenes=(part.case.path,),
-        techniques=parse_techniques(TECHNIQUES, has_bundle=True),
+        techniques=TECHNIQUES,
         out=work,
         alphas=(part.alpha,),
         sizes=(part.size,),
@@ -151,8 +151,8 @@ def _options(part: Part, arguments: argparse.Namespace, work: Path) -> BenchOpti
 
 
 def _tell(progress: Progress, part: Part, number: int, total: int, seconds: float) -> None:
-    alpha = "authored alpha" if part.alpha is None else f"alpha {part.alpha:g}"
-    progress.note(f"part {number + 1} of {total}: {part.case.scene}, {alpha}, {part.size}: {seconds:.0f} s")
+    what = f"{part.case.scene}, {said_alpha(part.alpha)}, {part.size}"
+    progress.note(f"part {number + 1} of {total}: {what}: {seconds:.0f} s")
 
 
 def _parse() -> argparse.Namespace:

@@ -103,7 +103,7 @@ def parse_techniques(names: Sequence[str], has_bundle: bool) -> tuple[str, ...]:
     Raises:
         Problem: There is none of that name, or nothing but commas is given.
     """
-    listed = [part.strip() for name in names for part in name.split(",") if part.strip()]
+    listed = _listed(names)
     if names and not listed:
         raise Problem("No technique is named.", f"Choose among: {', '.join((*TECHNIQUES, EVERY))}.")
     found: list[str] = []
@@ -128,10 +128,14 @@ def said_left_out(names: Sequence[str], has_bundle: bool) -> str | None:
         names: As of `parse_techniques`.
         has_bundle: Whether a bundle is given.
     """
-    if has_bundle or EVERY not in ",".join(names).split(","):
+    if has_bundle or EVERY not in _listed(names):
         return None
     missing = [name for name, entry in TECHNIQUES.items() if entry.needs_bundle]
     return f"{' and '.join(missing)} are left out: give a bundle with --bundle."
+
+
+def _listed(names: Sequence[str]) -> list[str]:
+    return [part.strip() for name in names for part in name.split(",") if part.strip()]
 
 
 def parse_times(frames: str | None, default_time: bool) -> tuple[float, ...]:

@@ -9,7 +9,7 @@ from benchmarks.comparing.scenes import BUNDLE, PATH_FRAMES
 from schemas.bench import BenchResult, BenchView
 from services.bench.bars import error_bars
 from services.bench.cells import bundle_of
-from services.bench.groups import Group, groups_of
+from services.bench.groups import Group, groups_of, said_setting
 from services.bench.page import said_machines
 
 PAPER = ("minecraft_village_caves", 2.0), ("sponza", 4.0)
@@ -58,9 +58,7 @@ def pictures(result: BenchResult) -> dict[str, str]:
 def _driver(driver: str, result: BenchResult, drawn: Mapping[tuple[str, str], str]) -> list[str]:
     views, first = result.views, _first(result)
     groups = groups_of(first)
-    about = first[0]
-    alpha = "authored alpha" if about.alpha is None else f"alpha {about.alpha:g}"
-    where = f"{alpha}, {about.width}x{about.height}"
+    where = said_setting(first[0])
     parts = [f"## {driver}\n", *(f"{line}.\n" for line in said_machines(views))]
     parts.append(_what(result))
     parts.append(f"### Figure 6: squared error within a budget ({where})\n")
@@ -82,9 +80,10 @@ def _driver(driver: str, result: BenchResult, drawn: Mapping[tuple[str, str], st
         "less of one and no more of the rest), and how often it has the least error of a budget among those that a "
         "renderer can run:\n"
     )
-    parts.append(tables.winners(groups_of(views)))
-    parts.append(f"Where `{LEARNED}` has more than 1.05 times the least error of a budget:\n")
-    parts.append(tables.losses(groups_of(views), LEARNED))
+    every = groups_of(views)
+    parts.append(tables.winners(every))
+    parts.append(f"Where `{LEARNED}` has more than {tables.ALIKE:g} times the least error of a budget:\n")
+    parts.append(tables.losses(every, LEARNED))
     return parts
 
 

@@ -15,6 +15,7 @@ from services.bench.groups import (
     group,
     measured,
     offline,
+    said_setting,
     said_technique,
     title_of,
 )
@@ -25,7 +26,7 @@ STAGES = (FEATURES, IMPORTANCE, BUFFER, READBACK)
 """DHOIT's stages (Table 1), and what it does not time."""
 _BUFFER = {"opaque", "count", "prefix", "chain", "chain-depth", "chain-colour", "resolve"}
 NOT_MEASURED = "–"
-_ALIKE = 1.05
+ALIKE = 1.05
 """Times the least error that counts as the least."""
 
 
@@ -100,16 +101,14 @@ def scores(views: Sequence[BenchView]) -> str:
 def scores_by_setting(views: Sequence[BenchView]) -> str:
     """Q of each opacity and size, a column a technique: geometric means at equal fragments, budgets ascending."""
     names = _names([group("", views)], "fragments")
-    settings = dict.fromkeys((view.alpha, view.width, view.height) for view in views)
     lines = []
-    for alpha, width, height in settings:
-        of = [view for view in views if (view.alpha, view.width, view.height) == (alpha, width, height)]
+    for setting in dict.fromkeys(map(said_setting, views)):
+        of = [view for view in views if said_setting(view) == setting]
         found: dict[str, dict[float, float | None]] = {name: {} for name in names}
         for row in measured(group("", of).rows, "fragments"):
             found[said_technique(row.key)][row.key.budget_factor or 0.0] = row.score
         cells = [" / ".join(number(by[factor]) for factor in sorted(by)) or NOT_MEASURED for by in found.values()]
-        opacity = "authored alpha" if alpha is None else f"alpha {alpha:g}"
-        lines.append([f"{opacity}, {width}x{height}", str(len(of)), *cells])
+        lines.append([setting, len(of), *cells])
     return table(("opacity, size", "scenes", *names), lines)
 
 
@@ -176,7 +175,7 @@ def winners(groups: Sequence[Group]) -> str:
 
 
 def losses(groups: Sequence[Group], name: str) -> str:
-    """Where another technique that a renderer can run has the least error of a budget, by more than `_ALIKE`."""
+    """Where another technique that a renderer can run has the least error of a budget, by more than `ALIKE`."""
     lost: list[tuple[float, tuple[str, ...]]] = []
     for each in groups:
         rows = [row for row in measured(each.rows, "fragments") if row.is_runnable and row.mse is not None]
@@ -184,7 +183,7 @@ def losses(groups: Sequence[Group], name: str) -> str:
             found = {said_technique(row.key): row for row in rows if row.key.budget_factor == factor}
             best = min(found, key=lambda one: found[one].mse or 0.0)
             least, own = found[best], found.get(name)
-            if own is not None and (own.mse or 0.0) > _ALIKE * (least.mse or 0.0):
+            if own is not None and (own.mse or 0.0) > ALIKE * (least.mse or 0.0):
                 over = (own.mse or 0.0) / (least.mse or 1.0)
                 line = (each.title, f"{factor:g} WH", _e5(own.mse), best, _e5(least.mse), number(over))
                 lost.append((over, line))

@@ -146,8 +146,17 @@ def group(title: str, views: Sequence[BenchView]) -> Group:
 
 def title_of(view: BenchView) -> str:
     """What a view is averaged under."""
-    alpha = "authored alpha" if view.alpha is None else f"alpha {view.alpha:g}"
-    return f"{view.scene}, {alpha}, {view.width}x{view.height}"
+    return f"{view.scene}, {said_setting(view)}"
+
+
+def said_setting(view: BenchView) -> str:
+    """Opacity and size of a view in words."""
+    return f"{said_alpha(view.alpha)}, {view.width}x{view.height}"
+
+
+def said_alpha(alpha: float | None) -> str:
+    """Opacity in words."""
+    return "authored alpha" if alpha is None else f"alpha {alpha:g}"
 
 
 def said_budget(key: CellKey) -> str:

@@ -20,6 +20,7 @@ from schemas.problem import ExitCode, Problem
 from schemas.scene import SceneArrays
 from schemas.view import View
 from services.bench.cells import Bundle, bundle_of, planned
+from services.bench.groups import said_alpha
 from services.bench.kept import Kept
 from services.bench.measure import Bench
 from services.bench.options import BenchOptions
@@ -160,11 +161,6 @@ def _measure(
     kept.add(view)
     progress.note(f"{where}: {len(cells)} cells in {view.seconds:.0f} s")
     told(view)
-
-
-def said_alpha(alpha: float | None) -> str:
-    """Opacity in words."""
-    return "authored alpha" if alpha is None else f"alpha {alpha:g}"
 
 
 def _key(place: _Place, options: BenchOptions) -> str:

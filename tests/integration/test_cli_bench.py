@@ -177,7 +177,7 @@ def test_the_suite_publishes_its_results_and_a_page(
     monkeypatch.setattr(suite, "RESULTS", folder / "results")
     monkeypatch.setattr(suite, "PAGE", folder / "BENCH.md")
     monkeypatch.setattr(scenes, "SIZES", ((48, 32),))
-    monkeypatch.setattr(suite, "TECHNIQUES", ["sbuffer", "kbuffer", "kbuffer-importance"])
+    monkeypatch.setattr(suite, "TECHNIQUES", ("sbuffer", "kbuffer", "kbuffer-importance"))
     options = ["--work", "work", "--only", "nested_shells", "--size", "48x32", "--alpha", ".33,authored"]
     monkeypatch.setattr("sys.argv", ["suite", *options, "--repeats", "1", "--scenes", "nowhere"])
     assert suite.main() == 0

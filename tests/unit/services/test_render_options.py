@@ -40,7 +40,7 @@ def test_a_technique_without_a_name_is_refused(names: tuple[str, ...]) -> None:
 
 
 def test_all_says_what_it_leaves_out_without_a_bundle() -> None:
-    for names in (["all"], ["kbuffer,all"]):
+    for names in (["all"], ["kbuffer,all"], ["kbuffer, all"]):
         said = said_left_out(names, has_bundle=False) or ""
         for name in set(TECHNIQUES) - set(parse_techniques(names, has_bundle=False)):
             assert name in said
