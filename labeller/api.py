@@ -31,7 +31,6 @@ def allocate(
     tail: TailName = DEFAULT_TAIL,
     g: float = DENSITY_G,
     metric: MetricName = "display",
-    k_min: int = 1,
     weights: ArrayLike | None = None,
     vkb: VkbOptions = _VKB,
     fill: FillName = "exact",
@@ -63,7 +62,6 @@ def allocate(
         tail: What stands for the fragments beyond k: one of `schemas.tail.TAILS` (METHOD section 2).
         g: Steepness of the density tail.
         metric: Space of the squared error, which is summed over RGB: `display` (sRGB, clamped), `linear` or `paper`.
-        k_min: Fewest fragments of an occupied pixel: 1 (or 0 at a budget that does not cover that), or always 0.
         weights: [P] or [H, W], >= 0: what a pixel's error counts, such as a saliency map; None: every pixel counts 1.
         vkb: Factors of rule `importance`.
         fill: How `importance`, `uniform` and `proportional` come from weights to counts.
@@ -79,14 +77,12 @@ def allocate(
     _one_of("tail", tail, TAILS)
     _one_of("metric", metric, METRICS)
     _one_of("fill", fill, get_args(FillName))
-    if not isinstance(k_min, int | np.integer) or k_min not in (0, 1):
-        raise _wrong(f"k_min is {k_min}.", "Give 0 or 1.")
     if not isinstance(vkb, VkbOptions):
         raise _wrong(f"vkb is of type {type(vkb).__name__}.", "Give renderer.allocation.importance.VkbOptions.")
     wanted = budgets_of(budgets)
     dump = fragments if isinstance(fragments, FragmentDump) else fragments_of(fragments)
     curves = error_curves(dump, tail, g, metric, None if weights is None else _weights(weights, dump))
-    return allocate_curves(dump, curves, wanted, rule, vkb=vkb, fill=fill, k_min=k_min)
+    return allocate_curves(dump, curves, wanted, rule, vkb=vkb, fill=fill)
 
 
 def fragments_of(arrays: Mapping[str, ArrayLike]) -> FragmentDump:

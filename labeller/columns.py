@@ -88,14 +88,14 @@ def columns(count_type: CountType = "uint16") -> tuple[Column, ...]:
             per="row",
             dtype=count_type,
             unit="segments",
-            meaning="segments of the lower hull of the pixel's error curve; 0 where it is exact at k_min",
+            meaning="segments of the lower hull of the pixel's error curve; 0 where it is exact at k = 0",
         ),
         Column(
             name="hull_length",
             per="segment",
             dtype=count_type,
             unit="fragments",
-            meaning="how many more fragments the segment's end keeps than its start; a row's first starts at k_min",
+            meaning="how many more fragments the segment's end keeps than its start; a row's first starts at 0",
         ),
         Column(
             name="hull_error",

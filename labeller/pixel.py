@@ -54,18 +54,17 @@ def errors(found: NDArray[np.float64], metric: MetricName = "display") -> NDArra
     return np.where(squared > _ROUNDING, squared, 0.0).astype(np.float32)
 
 
-def hull(error: NDArray[np.float32], k_min: int = 1) -> list[int]:
-    """Vertices k of the lower hull of a curve on k_min..n, without its flat end; empty if the pixel cannot gain.
+def hull(error: NDArray[np.float32]) -> list[int]:
+    """Vertices k of the lower hull of a curve on 0..n, without its flat end; empty if the pixel cannot gain.
 
     Args:
         error: `e_p(k)`, float32 [n+1].
-        k_min: 0 or 1.
     """
     values = error.astype(np.float64).tolist()
     stack: list[int] = []
-    if len(values) - 1 <= k_min or values[k_min] == 0.0:
+    if values[0] == 0.0:
         return stack
-    for k in range(k_min, len(values)):
+    for k in range(len(values)):
         while len(stack) >= 2:
             i, j = stack[-2:]
             if (values[i] - values[j]) * (k - j) > (values[j] - values[k]) * (j - i):

@@ -158,45 +158,47 @@ def curve(
 
 
 def heap_removal(
-    curves: Sequence[NDArray[np.float32]], budget: int, k_min: int, key: Literal["absolute", "increment"] = "absolute"
+    curves: Sequence[NDArray[np.float32]], budget: int, key: Literal["absolute", "increment"] = "absolute"
 ) -> list[int]:
     """Algorithm 1 of DHOIT, literally: take one fragment at a time from the pixel with the smallest key.
+
+    As printed it leaves every occupied pixel one fragment, where the budget covers that; by increments it does not.
 
     Args:
         curves: Per pixel its errors float32 [n+1].
         budget: F; removal stops when no more than F fragments are left, or none can be removed.
-        k_min: No pixel goes below `min(k_min, n)`.
         key: `absolute`: the error after the removal (as printed); `increment`: by how much it grows.
 
     Returns:
         k of each pixel. Ties go to the smaller pixel index.
     """
     k = [len(e) - 1 for e in curves]
+    least = int(key == "absolute" and budget >= sum(n > 0 for n in k))
 
     def entry(p: int) -> tuple[float, int]:
         error = curves[p]
         after = error[k[p] - 1]
         return float(after if key == "absolute" else after - error[k[p]]), p
 
-    heap = [entry(p) for p in range(len(curves)) if k[p] > k_min]
+    heap = [entry(p) for p in range(len(curves)) if k[p] > least]
     heapq.heapify(heap)
     used = sum(k)
     while used > budget and heap:
         _, p = heapq.heappop(heap)
         k[p] -= 1
         used -= 1
-        if k[p] > k_min:
+        if k[p] > least:
             heapq.heappush(heap, entry(p))
     return k
 
 
-def optimum(curves: Sequence[NDArray[np.float32]], budget: int, k_min: int) -> float:
-    """Smallest sum of errors over all k with `min(k_min, n) <= k <= n` and `sum k <= F`, by dynamic programming."""
+def optimum(curves: Sequence[NDArray[np.float32]], budget: int) -> float:
+    """Smallest sum of errors over all k with `0 <= k <= n` and `sum k <= F`, by dynamic programming."""
     best = np.full(budget + 1, math.inf)
     best[0] = 0.0
     for error in curves:
         spent = np.full(budget + 1, math.inf)
-        for k in range(min(k_min, len(error) - 1), min(len(error) - 1, budget) + 1):
+        for k in range(min(len(error) - 1, budget) + 1):
             spent[k:] = np.minimum(spent[k:], best[: budget + 1 - k] + float(error[k]))
         best = spent
     return float(best.min())

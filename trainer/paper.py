@@ -113,7 +113,7 @@ def paper_batch(
             about = _about(view)
             inputs.append(paper_inputs(view, rows, about.budgets[level]))
             price = float(np.exp(view.anchors[level]))
-            counts.append(_optimal_counts(view.offsets, view.slopes, view.lengths, view.k_min, price, rows))
+            counts.append(_optimal_counts(view.offsets, view.slopes, view.lengths, price, rows))
             budgets.append(np.tile(np.array([[about.budgets[level], about.pixels]], np.float32), (GROUP, 1)))
     return np.concatenate(inputs), np.concatenate(counts), np.concatenate(budgets), len(inputs) / total
 
@@ -131,15 +131,14 @@ def importance_counts(weights: Weights, view: ViewData, level: int, budget: int,
         view: The view.
         level: Which of its anchors: the network reads the whole view's budget.
         budget: Fragments for these rows.
-        fill: From importances to counts. `paper` may give more than n, which is cut off, and less than k_min, whose
-            error is taken for that of k_min: rows know no other. So it is shown better than it is.
+        fill: From importances to counts. `paper` may give more than n, which is cut off.
     """
     inputs = paper_inputs(view, slice(None), _about(view).budgets[level])
     importance = weights.answer(inputs)[:, 0]
     n = view.n.astype(np.int32)
     if fill == "budget":
-        return budget_fill(importance, n, budget, view.k_min)
-    return np.clip(paper_fill(importance, budget), np.minimum(view.k_min, n), n).astype(np.int32)
+        return budget_fill(importance, n, budget)
+    return np.minimum(paper_fill(importance, budget), n)
 
 
 def _window(depth: NDArray[np.floating], near: float, far: float) -> NDArray[np.float64]:
@@ -161,12 +160,11 @@ def _optimal_counts(
     offsets: NDArray[np.int64],
     slopes: NDArray[np.float32],
     lengths: NDArray[np.float32],
-    k_min: int,
     price: float,
     rows: NDArray[np.int64],
 ) -> NDArray[np.float32]:
     """What the optimum keeps of some rows at a price: every hull segment that gains more."""
-    counts = np.full(len(rows), k_min, dtype=np.float32)
+    counts = np.zeros(len(rows), dtype=np.float32)
     for i in range(len(rows)):
         for j in range(offsets[rows[i]], offsets[rows[i] + 1]):
             if slopes[j] > price:

@@ -2,8 +2,8 @@
 
 `renderer.allocation.lattice` is the same in numpy, and says why it is exact. In order:
 
-- `select`: totals of n in blocks, k_min, and whether all fits;
-- a predictor fills in the curves of the pixels that have a choice: n > k_min, unless all fits;
+- `select`: totals of n in blocks, and whether all fits;
+- a predictor fills in the curves of the occupied pixels, unless all fits;
 - `solve`: a list of these pixels, then rounds of counting at 64 prices, those that are not needed being empty
   dispatches. The list is not there before: what the predictor reads is gone then, and the peak is lower by it;
 - `place`: slots at the found price, the remainder, and their exclusive prefix sum.
@@ -34,7 +34,7 @@ CURVE_BYTES = 8
 
 STATE = np.dtype(
     [
-        *((name, "<u4") for name in ("k_min", "complete", "occupied", "open_pixels", "left", "low_sum")),
+        *((name, "<u4") for name in ("complete", "open_pixels", "budget", "low_sum")),
         *((name, "<u4") for name in ("listed", "rounds", "warm")),
         *((name, "<i4") for name in ("low", "high")),
         ("count_groups", "<u4", 3),
@@ -59,18 +59,12 @@ class SolvedState:
     """What the passes of a frame found.
 
     Attributes:
-        k_min: 1 where the budget covered every occupied pixel.
-        complete: Whether it covered every fragment, so that nothing was predicted or solved.
-        occupied: Pixels with fragments.
-        settled: Of them those that k_min settled.
+        complete: Whether the budget covered every fragment, so that nothing was predicted or solved.
         rounds: Rounds that counted.
         index: Of the price (`renderer.allocation.lattice.price`).
     """
 
-    k_min: int
     complete: bool
-    occupied: int
-    settled: int
     rounds: int
     index: int
 
@@ -104,7 +98,7 @@ class FrameAllocation:
     """The passes of one frame; made by `GpuAllocation.select`.
 
     Attributes:
-        listed: uint32 [P+1]: the pixels that have a choice, in any order; `place` turns it into the offsets. Made by
+        listed: uint32 [P+1]: the occupied pixels, in any order; `place` turns it into the offsets. Made by
             `solve`.
     """
 
@@ -123,9 +117,9 @@ class FrameAllocation:
         self._buffers = {_STATE: state, _COUNTS: counts, _BLOCKS: scratch}
 
     def select(self, budget: int) -> None:
-        """Totals, k_min, and whether all fits."""
+        """Totals, and whether all fits."""
         self._run("totals", self._groups)
-        self._run("begin", 1, blocks=self._groups, budget=min(budget, CEILING - 1))
+        self._run("begin", 1, blocks=self._groups, fragments=min(budget, CEILING - 1))
 
     def run_pixels(self, program: moderngl.ComputeShader, state_binding: int) -> None:
         """Run a shader on every pixel, as `run_for` does, with the state bound."""
@@ -137,7 +131,7 @@ class FrameAllocation:
         """Find the price of the listed pixels' curves; it stays in the state.
 
         Args:
-            curves: float32 [P, 2], the a and rate of `renderer.allocation.lattice.Curves`, where n > k_min.
+            curves: float32 [P, 2], the a and rate of `renderer.allocation.lattice.Curves`, where n > 0.
         """
         self.listed = self._ctx.buffer(reserve=4 * (self._pixels + 1))
         self._buffers |= {_CURVES: curves, _LIST: self.listed}
@@ -161,11 +155,7 @@ class FrameAllocation:
     def read_state(self) -> SolvedState:
         """What was found, for statistics after a frame."""
         state = np.frombuffer(self._buffers[_STATE].read(), dtype=STATE)[0]
-        k_min, complete, occupied, open_pixels, rounds = (
-            int(state[name]) for name in ("k_min", "complete", "occupied", "open_pixels", "rounds")
-        )
-        settled = 0 if complete else occupied - open_pixels
-        return SolvedState(k_min, bool(complete), occupied, settled, rounds, int(state["low"]))
+        return SolvedState(bool(state["complete"]), int(state["rounds"]), int(state["low"]))
 
     def _run(self, name: str, groups: int | None, **uniforms: int) -> None:
         """Run a shader, on as many groups as the state says a round needs where the number is None."""

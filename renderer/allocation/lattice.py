@@ -25,7 +25,7 @@ ROUNDS: Final = 5
 SHIFT: Final = 9
 """Digits of float32 that prices do without. Around t = 10 they are 2^-11 apart."""
 LAST: Final = 115 << (23 - SHIFT)
-"""Index of the greatest price, 2^115: at the ends of the lattice every curve below gives n and k_min."""
+"""Index of the greatest price, 2^115: at the ends of the lattice every curve below gives n and 0."""
 MOST_GAIN: Final = 2.0**100
 LEAST_RATE: Final = 2.0**-98
 MOST_RATE: Final = 2.0**12
@@ -111,18 +111,17 @@ def price(index: int) -> np.float32:
     return np.float32(-magnitude if index < 0 else magnitude)
 
 
-def fragments_at(t: np.float32, curves: Curves, n: NDArray[np.integer], k_min: int) -> NDArray[np.int64]:
-    """`clamp(floor(1.5 + (a + t) rate), k_min, n)`, int64 [P]; n is at most MOST_FRAGMENTS."""
+def fragments_at(t: np.float32, curves: Curves, n: NDArray[np.integer]) -> NDArray[np.int64]:
+    """`clamp(floor(1.5 + (a + t) rate), 0, n)`, int64 [P]; n is at most MOST_FRAGMENTS."""
     k = np.floor((curves.a + t) * curves.rate + np.float32(1.5))
-    least, most = (np.asarray(x, dtype=np.float32) for x in (np.minimum(n, k_min), n))
-    return np.asarray(np.clip(k, least, most), dtype=np.int64)
+    return np.asarray(np.clip(k, np.float32(0.0), np.asarray(n, dtype=np.float32)), dtype=np.int64)
 
 
 def solve_on_lattice(curves: Curves, n: NDArray[np.integer], budget: int, start: int | None = None) -> Solution:
     """The counts of predicted gain curves at the one price that uses a budget.
 
     Args:
-        curves: Of every pixel; those of pixels whose count alone settles their k are not read.
+        curves: Of every pixel; those of pixels without fragments are not read.
         n: int [P], fragments of each pixel; what is above MOST_FRAGMENTS cannot have slots.
         budget: F, fragments to spend.
         start: `Solution.index` of an earlier frame; changes how long it takes, not what is found.
@@ -130,21 +129,18 @@ def solve_on_lattice(curves: Curves, n: NDArray[np.integer], budget: int, start:
     usable = np.minimum(np.asarray(n, dtype=np.int64), MOST_FRAGMENTS)
     if budget >= usable.sum():
         return Solution(usable.astype(np.int32), None, 0)
-    k_min = int(budget >= np.count_nonzero(usable))
-    k = np.minimum(usable, k_min)
-    opened = np.flatnonzero(usable > k_min)
+    opened = np.flatnonzero(usable)
     chosen = Curves(curves.a[opened], curves.rate[opened])
-    left = budget - int(k.sum()) + k_min * len(opened)
-    low, high, rounds = _search(chosen, usable[opened], left, k_min, start)
-    k[opened], most = (fragments_at(price(i), chosen, usable[opened], k_min) for i in (low, high))
-    growth = np.zeros_like(k)
+    low, high, rounds = _search(chosen, usable[opened], budget, start)
+    k, growth = np.zeros_like(usable), np.zeros_like(usable)
+    k[opened], most = (fragments_at(price(i), chosen, usable[opened]) for i in (low, high))
     growth[opened] = most - k[opened]
     before = np.cumsum(growth) - growth
     k += np.clip(budget - k.sum() - before, 0, growth)
     return Solution(k.astype(np.int32), low, rounds)
 
 
-def _search(curves: Curves, n: NDArray[np.int64], left: int, k_min: int, start: int | None) -> tuple[int, int, int]:
+def _search(curves: Curves, n: NDArray[np.int64], budget: int, start: int | None) -> tuple[int, int, int]:
     """The greatest index whose counts are within the budget, the next one, and the rounds it took."""
     low, high = -LAST, LAST
     edges = _between(low, high)
@@ -155,7 +151,7 @@ def _search(curves: Curves, n: NDArray[np.int64], left: int, k_min: int, start: 
     while high - low > 1:
         rounds += 1
         for edge in edges:
-            if fragments_at(price(edge), curves, n, k_min).sum() > left:
+            if fragments_at(price(edge), curves, n).sum() > budget:
                 high = edge
                 break
             low = edge

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import timing
-from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
+from renderer.allocation.fill import budget_fill, solve_lambda
 from renderer.allocation.gpu import CURVE_BYTES, CURVE_DEFINES, LIST_BYTES, FrameAllocation, GpuAllocation
 from renderer.allocation.lattice import within_limits
 from renderer.features import TEXELS, texels_of
@@ -39,7 +39,7 @@ from renderer.techniques.chain import (
     render_chain,
     render_complete,
 )
-from renderer.techniques.skips import PREDICTOR, SETTLED_PIXELS, TAIL, UNREAD_SUMS, frame_skips
+from renderer.techniques.skips import PREDICTOR, TAIL, UNREAD_SUMS, frame_skips
 from schemas.bundle import GLSL, ONNX, load_manifest
 from schemas.limits import LIMITS
 from schemas.tail import DENSITY_BINS
@@ -68,12 +68,6 @@ class _Prediction:
     curves: moderngl.Buffer
     passes: dict[str, float]
     before_bytes: int
-    k_min: int
-    occupied: int
-
-    def serves(self, frame: Frame, fragments: int) -> bool:
-        """Whether a budget of a frame can be solved with it: with a lower k_min more pixels need curves."""
-        return self.frame() is frame and int(fragments >= self.occupied) >= self.k_min
 
 
 def before_bytes(gathered: Gathered) -> int:
@@ -144,7 +138,7 @@ class KBufferDeep:
         counts, _, _ = frame.depth_range()
         if self._allocation is None:
             self._allocation = GpuAllocation(frame.ctx)
-        kept = self._prediction if self._prediction and self._prediction.serves(frame, budget.fragments) else None
+        kept = self._prediction if self._prediction and self._prediction.frame() is frame else None
         gathered = frame.gather("gather", self._texels, self._bins) if kept is None else kept.gathered
         before = before_bytes(gathered) if kept is None else kept.before_bytes
         clock = Clock(frame.ctx)
@@ -175,13 +169,11 @@ class KBufferDeep:
         k = np.diff(np.frombuffer(offsets.read(), dtype=np.uint32).astype(np.int64)).astype(np.int32)
         if kept is None and self._keeps_curves and not state.complete:
             predicted = {"predict": clock.passes["predict"]}
-            self._prediction = _Prediction(
-                weakref.ref(frame), gathered, curves, predicted, before, state.k_min, state.occupied
-            )
+            self._prediction = _Prediction(weakref.ref(frame), gathered, curves, predicted, before)
         pool_bytes = SLOT_BYTES * budget.fragments
         during = chain_bytes(for_tail, budget.tail) + (CURVE_BYTES if self._keeps_curves else 0)
         during += 0 if for_tail is gathered else gathered.pixel_bytes  # beside what another tail than its own reads
-        skips = {PREDICTOR: int(state.complete), SETTLED_PIXELS: state.settled, TAIL: 0}
+        skips = {PREDICTOR: int(state.complete), TAIL: 0}
         return Rendered(
             linear=linear,
             k=k,
@@ -194,7 +186,7 @@ class KBufferDeep:
         )
 
     def _curves(self, frame: Frame, gathered: Gathered, allocation: FrameAllocation) -> moderngl.Buffer:
-        """Run the network on the pixels that have a choice."""
+        """Run the network on the pixels with fragments."""
         program = frame.gpu.programs.compute(
             "kbuffer-deep/curves.comp", {**CURVE_DEFINES, **self._defines}, self._texts
         )
@@ -209,37 +201,30 @@ class KBufferDeep:
         n = frame.count()
         gathered = frame.gather("gather", self._texels, self._bins)
         clock = Clock(frame.ctx)
-        slots, settled = self._allocate(frame, n, budget.fragments, clock)
-        # What is read back of every open pixel, and the list of them.
+        slots = self._allocate(frame, n, budget.fragments, clock)
+        # What is read back of every occupied pixel, and the list of them.
         columns = len(self.manifest.outputs if self._network is None else self.manifest.features)
-        answers = 4 * (1 + columns) * (int(np.count_nonzero(n)) - settled)
+        answers = 4 * (1 + columns) * int(np.count_nonzero(n))
         before = RANGE_BYTES + gathered.pixel_bytes - (-answers // frame.pixels)
         rendered = render_chain(frame, slots, n, budget, gathered, before)
-        skips = {**rendered.skips, SETTLED_PIXELS: settled, UNREAD_SUMS: self._unread}
+        skips = {**rendered.skips, UNREAD_SUMS: self._unread}
         shared = frame.passes("opaque", "count", "gather")
         return replace(rendered, passes={**shared, **clock.passes, **rendered.passes}, skips=skips)
 
-    def _allocate(
-        self, frame: Frame, n: NDArray[np.uint32], fragments: int, clock: Clock
-    ) -> tuple[NDArray[np.int32], int]:
-        """Slots of every pixel, and how many occupied pixels needed no network."""
-        k_min = feasible_k_min(n, fragments)
-        slots = np.minimum(n, k_min).astype(np.int32)
+    def _allocate(self, frame: Frame, n: NDArray[np.uint32], fragments: int, clock: Clock) -> NDArray[np.int32]:
+        """Slots of every pixel."""
+        slots = np.zeros(len(n), dtype=np.int32)
         with clock.measure("select"):
-            open_pixels = np.flatnonzero(n > k_min).astype(np.uint32)
-        settled = int(np.count_nonzero(n)) - len(open_pixels)
-        if len(open_pixels) == 0:
-            return slots, settled
+            occupied = np.flatnonzero(n).astype(np.uint32)
         with clock.measure("predict"):
-            answers = self.predict(frame, open_pixels)
+            answers = self.predict(frame, occupied)
         with clock.measure("lambda"):
-            left = fragments - int(slots.sum(dtype=np.int64)) + k_min * len(open_pixels)
             if self.manifest.head == "importance":  # NaN, of a network that overflows, is no importance
-                slots[open_pixels] = budget_fill(np.nan_to_num(answers[:, 0]), n[open_pixels], left, k_min)
+                slots[occupied] = budget_fill(np.nan_to_num(answers[:, 0]), n[occupied], fragments)
             else:
                 a, b = within_limits(answers[:, 0], answers[:, 1])
-                slots[open_pixels], _ = solve_lambda(a, b, n[open_pixels], left, k_min)
-        return slots, settled
+                slots[occupied], _ = solve_lambda(a, b, n[occupied], fragments)
+        return slots
 
     def predict(self, frame: Frame, pixels: NDArray[np.uint32]) -> NDArray[np.float32]:
         """Run the network.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from renderer import timing
-from renderer.allocation.fill import budget_fill, feasible_k_min
+from renderer.allocation.fill import budget_fill
 from renderer.allocation.importance import VkbOptions, vkb_importance
 from renderer.frame import Clock, Frame
 from renderer.techniques.base import Budget, Rendered
@@ -39,7 +39,7 @@ class KBufferImportance:
                 read = np.frombuffer(gathered.nearest_facing.read(4 * frame.pixels), dtype=np.uint32)
             facing = read.astype(np.uint8)
             weights = vkb_importance(n, facing, frame.width, frame.height, self._options)
-            slots = budget_fill(weights, n, budget.fragments, feasible_k_min(n, budget.fragments))
+            slots = budget_fill(weights, n, budget.fragments)
         before = RANGE_BYTES + gathered.pass_bytes
         rendered = render_chain(frame, slots, n, budget, frame.retire(gathered), before)
         rendered.passes.update(clock.passes)

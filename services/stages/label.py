@@ -27,7 +27,7 @@ def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
     params = task.params
     dump = read_dump(desk.artifact(task, "render"))
     curves = error_curves(dump, params["tail"], params["g"], params["metric"])
-    hulls = lower_hulls(curves, 1)
+    hulls = lower_hulls(curves)
     report(0.3, f"curves of {dump.total:,} fragments")
     budgets = needed_budgets(params["budgets"], dump.total)
     made = {rule: allocate_curves(dump, curves, budgets, rule, hulls=hulls) for rule in RULES}
@@ -38,7 +38,7 @@ def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
         # What is compared with other rules is not weighted; what is learned is.
         counted = flip_weights(dump, [found.k for found in made["optimal"]], params["tail"], params["g"])
         curves = error_curves(dump, params["tail"], params["g"], params["metric"], counted)
-    taught = hulls if weights == DEFAULT_WEIGHTS else lower_hulls(curves, 1)
+    taught = hulls if weights == DEFAULT_WEIGHTS else lower_hulls(curves)
     written = write_shard(folder / SHARD, dump, curves, taught, budgets, seed=params["seed"], weights=weights)
     facts = {
         "errors": {rule: _answers(params["budgets"], allocations, _error, 0.0) for rule, allocations in made.items()},

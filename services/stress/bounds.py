@@ -79,7 +79,7 @@ BOUNDS: Final[dict[str, Bound]] = {
     "greedy": Bound(0.0, "absolute", 1.0, "Pixels whose k differs from the literal heap's, ties included."),
     "increment": Bound(0.0, "absolute", 1.0, "Pixels whose k differs from the literal heap's, ties included."),
     "limits": Bound(
-        0.0, "absolute", 1.0, "Pixels outside of `k_min <= K <= n`, fragments above F, errors that are not finite."
+        0.0, "absolute", 1.0, "Pixels outside of `0 <= K <= n`, fragments above F, errors that are not finite."
     ),
     "bands": Bound(0.0, "absolute", 1.0, "Pixels whose k differs where the view comes in row bands."),
     "optimal.greedy": Bound(
@@ -99,7 +99,7 @@ BOUNDS: Final[dict[str, Bound]] = {
         "By how much the error of `optimal` rises with F. It is optimal up to its certificate only, so it may by "
         "the gap, and no more than the gap's own limit. The floor is per pixel.",
     ),
-    "fill.limits": Bound(0.0, "absolute", 1.0, "Fragments that a fill misses F by, pixels outside of `[k_min, n]`."),
+    "fill.limits": Bound(0.0, "absolute", 1.0, "Fragments that a fill misses F by, pixels outside of `[0, n]`."),
     "fill.budget": Bound(
         1e-12,
         "relative",

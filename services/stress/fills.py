@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from labeller.curves import Curves
-from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
+from renderer.allocation.fill import budget_fill, solve_lambda
 from renderer.allocation.lattice import curves_of, solve_on_lattice
 from schemas.tail import DENSITY_G
 from services.stress.allocations import edge_budgets
@@ -29,11 +29,11 @@ def run(options: Options) -> Iterator[Finding]:
     n = np.where(rng.random(pixels) < 0.02, 4096, rng.integers(0, 7, pixels)).astype(np.int32)
     limits = []
     for name, weights in weight_cases(rng, pixels).items():
-        found = [(f, budget_fill(weights, n, f, feasible_k_min(n, f))) for f in edge_budgets(n)]
+        found = [(f, budget_fill(weights, n, f)) for f in edge_budgets(n)]
         limits.append(_limits(f"weights {name}", n, found))
         yield _order_of_weights(name, n, weights, found)
     for name, (a, b) in gain_cases(rng, pixels).items():
-        found = [(f, solve_lambda(a, b, n, f, feasible_k_min(n, f))[0]) for f in edge_budgets(n)]
+        found = [(f, solve_lambda(a, b, n, f)[0]) for f in edge_budgets(n)]
         limits.append(_limits(f"gains {name}", n, found))
         yield _order_of_gains("fill.lambda", name, n, a, b, found)
         curves = curves_of(a, b)
@@ -92,8 +92,7 @@ def overflow_cases(rng: np.random.Generator, pixels: int) -> dict[str, tuple[Num
 def _limits(name: str, n: Counts, found: list[tuple[int, Counts]]) -> Finding:
     wrong, where = 0, ""
     for budget, k in found:
-        least = np.minimum(n, feasible_k_min(n, budget))
-        count = abs(int(k.sum()) - min(budget, int(n.sum()))) + int(((k < least) | (k > n)).sum())
+        count = abs(int(k.sum()) - min(budget, int(n.sum()))) + int(((k < 0) | (k > n)).sum())
         if count:
             wrong, where = wrong + count, f"F {budget}"
     return counted("fill.limits", name, wrong, where)
@@ -104,9 +103,8 @@ def _order_of_weights(name: str, n: Counts, weights: Numbers, found: list[tuple[
     w = weights.astype(np.float64)
     late, places = [], []
     for budget, k in found:
-        least = np.minimum(n, feasible_k_min(n, budget))
         with np.errstate(divide="ignore"):
-            given, missing = (k > least) & (w > 0.0), (k < n) & (w > 0.0)
+            given, missing = (k > 0) & (w > 0.0), (k < n) & (w > 0.0)
             last = (k[given] / w[given]).max(initial=0.0)
             first = ((k[missing] + 1) / w[missing]).min(initial=math.inf)
         late.append(max(last / first - 1.0, 0.0) if math.isfinite(first) else 0.0)
@@ -121,8 +119,7 @@ def _order_of_gains(
     gain, decay = a.astype(np.float64), b.astype(np.float64)
     late, places = [], []
     for budget, k in found:
-        least = np.minimum(n, feasible_k_min(n, budget))
-        given, missing = k > least, k < n
+        given, missing = k > 0, k < n
         lowest = (gain - (k - 1.5) * decay)[given].min(initial=math.inf)
         highest = (gain - (k - 0.5) * decay)[missing].max(initial=-math.inf)
         scale = float((np.abs(gain) + n * decay).max())
@@ -175,12 +172,12 @@ def _fill_in_any_order(rng: np.random.Generator, count: int) -> Iterator[Finding
     budget = int(0.4 * n.sum())
     # Weights without a pattern: no two pixels have fragments at the same scale, a tie that the index would decide.
     weights = rng.uniform(0.1, 1.0, count)
-    plain = budget_fill(weights, n, budget, 1)
+    plain = budget_fill(weights, n, budget)
     for name, order in (("reversed", np.arange(count)[::-1]), ("shuffled", rng.permutation(count))):
         moved = np.empty_like(plain)
-        moved[order] = budget_fill(weights[order], n[order], budget, 1)
+        moved[order] = budget_fill(weights[order], n[order], budget)
         wrong = np.flatnonzero(moved != plain)
         yield counted("fill.order", f"{count:.0e} importances, {name}", len(wrong), f"pixel {wrong[:1]}")
     with one_thread():
-        alone = budget_fill(weights, n, budget, 1)
+        alone = budget_fill(weights, n, budget)
     yield counted("fill.order", f"{count:.0e} importances, 1 thread", int((alone != plain).sum()))

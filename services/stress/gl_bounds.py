@@ -64,7 +64,7 @@ BOUNDS: Final[dict[str, Bound]] = {
         0.0,
         "absolute",
         1.0,
-        "Pixels outside of `k_min <= K <= n`, fragments above F (or unspent, where the technique uses its budget "
+        "Pixels outside of `0 <= K <= n`, fragments above F (or unspent, where the technique uses its budget "
         "whole), numbers that are not finite.",
     ),
     "weighted-average": _picture(1e-6, "Sums of up to 100 fragments; `(1 - A/n)^n` multiplies a rounding by n."),

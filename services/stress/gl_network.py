@@ -80,7 +80,6 @@ def _bundle(folder: Path, weights: Weights, tail: TailName, driver: str) -> None
         name="stress",
         tail=TailSpec(name=tail, g=0.75),
         metric="display",
-        k_min=1,
         provenance=Provenance(scenes={}, code_version="0", seed=0, machine="stress"),
         evaluation={},
     )

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.allocation.fill import budget_fill, feasible_k_min
+from renderer.allocation.fill import budget_fill
 from renderer.frame import Frame
 from renderer.techniques import (
     TECHNIQUES,
@@ -72,7 +72,7 @@ def random_allocation(frame: Frame, budget: Budget) -> NDArray[np.int32]:
     """An allocation that no rule would make: every k that a budget allows occurs somewhere."""
     n = frame.count()
     weights = np.random.default_rng(budget.fragments).random(frame.pixels) ** 4
-    return budget_fill(weights, n, budget.fragments, feasible_k_min(n, budget.fragments))
+    return budget_fill(weights, n, budget.fragments)
 
 
 def steps(
@@ -139,22 +139,20 @@ def bounded_rows(
     count = float(len(wrong))
     bound = bound_of("bounded.limits", deep=False)
     where = f"{case.scenery.name}: {wrong[0]}" if wrong else "nowhere"
-    yield Finding(f"{form.path}.F, K and k_min · {driver}", case.name, count, count, where, bound.value, bound.measure)
+    yield Finding(f"{form.path}.F and K · {driver}", case.name, count, count, where, bound.value, bound.measure)
 
 
 def broken_limits(name: str, rendered: Rendered, case: Case, fragments: int) -> list[str]:
     """What a picture within a budget does that it must not (METHOD.md section 3), in words."""
     n, k = case.dump.counts, rendered.k.astype(np.int64)
     whole = name in _WHOLE
-    # `kbuffer` reserves slots where nothing is, so that its budget may not reach every occupied pixel.
-    k_min = feasible_k_min(n, fragments) if name != KBuffer.name else 0
     spent = min(fragments, case.dump.total)
     checks = {
         "the picture is not finite": not np.isfinite(rendered.linear).all(),
         f"sum K = {k.sum()} is above F": k.sum() > fragments,
         f"sum K = {k.sum()} leaves a part of F": whole and k.sum() != spent,
         "K is above n": bool((k > n).any()),
-        "K is below k_min": bool((k < np.minimum(n, k_min)).any()),
+        "K is below 0": bool((k < 0).any()),
         "slots are not what was captured": rendered.captured != k.sum(),
     }
     return [why for why, broken in checks.items() if broken]

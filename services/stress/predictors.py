@@ -169,8 +169,8 @@ def _count_difference(
     """Largest difference of a pixel's count between two predictions at the same budget, and how many differ."""
     n = rng.integers(1, 40, len(truth))
     budget = int(0.4 * n.sum())
-    k, _ = solve_lambda(found[:, 0], found[:, 1], n, budget, 1)
-    expected, _ = solve_lambda(truth[:, 0], truth[:, 1], n, budget, 1)
+    k, _ = solve_lambda(found[:, 0], found[:, 1], n, budget)
+    expected, _ = solve_lambda(truth[:, 0], truth[:, 1], n, budget)
     return int(np.abs(k - expected).max()), int((k != expected).sum())
 
 

@@ -61,16 +61,15 @@ def exact_transmittance(level: int, n: int) -> Fraction:
     return Fraction(255 - level, 255) ** n
 
 
-def exact_hull(error: NDArray[np.float32], k_min: int) -> list[Fraction]:
-    """The lower convex hull of a curve at every k from `k_min`, exactly, until the error first is 0.
+def exact_hull(error: NDArray[np.float32]) -> list[Fraction]:
+    """The lower convex hull of a curve at every k, exactly, until the error first is 0.
 
     Args:
         error: float32 [n+1], `e(k)`, 0 at n.
-        k_min: First k.
     """
     values = [Fraction(float(e)) for e in error]
-    end = next(k for k in range(k_min, len(values)) if values[k] == 0)
-    hull, here = [values[k_min]], k_min
+    end = next(k for k in range(len(values)) if values[k] == 0)
+    hull, here = [values[0]], 0
     while here < end:
         # The steepest way down; of equal ones the longest.
         ahead = min(range(here + 1, end + 1), key=lambda k: ((values[k] - values[here]) / (k - here), -k))

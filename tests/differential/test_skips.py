@@ -6,11 +6,7 @@ import moderngl
 import numpy as np
 import pytest
 from support.scenes import SIZE, VIEW, shells
-from support.training import random_weights
 
-from renderer.allocation.fill import solve_lambda
-from renderer.capture import capture
-from renderer.features import derive, gather
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.techniques import TECHNIQUES, Budget, KBufferOptimal, technique
@@ -50,16 +46,3 @@ def test_pixels_that_need_no_tail_are_the_same_with_one(frame: Frame, dump: Frag
     assert (without.skips[TAIL], with_tail.skips[TAIL]) == (1, 0)
     differs = (without.linear != with_tail.linear).any(axis=2).ravel()
     assert not np.delete(differs, fullest).any()
-
-
-def test_settled_pixels_have_no_part_in_the_choice_of_lambda(gl: moderngl.Context) -> None:
-    dump = capture(Frame(GpuScene(gl, shells(layers=3)), VIEW, *SIZE)).dump
-    n = dump.counts
-    occupied, opened = np.flatnonzero(n > 0), np.flatnonzero(n > 1)
-    assert len(opened) < len(occupied)
-    a, b = random_weights(4).predict(derive(gather(dump)))
-    for budget in (len(occupied), dump.total // 2, dump.total - 1):
-        every, _ = solve_lambda(a[occupied], b[occupied], n[occupied], budget, 1)
-        left = budget - (len(occupied) - len(opened))
-        some, _ = solve_lambda(a[opened], b[opened], n[opened], left, 1)
-        assert np.array_equal(every[n[occupied] > 1], some)

@@ -80,7 +80,7 @@ def test_hulls_that_are_not_the_lowest_are_seen(monkeypatch: pytest.MonkeyPatch)
 
     def high(*args: Any) -> Hulls:
         hulls = lower(*args)
-        return Shuffled(hulls.offsets, hulls.k, hulls.error * np.float32(1.001), hulls.k_min)
+        return Shuffled(hulls.offsets, hulls.k, hulls.error * np.float32(1.001))
 
     assert violated(monkeypatch, "lower_hulls", high) == {"hull", "hull.slopes"}
 

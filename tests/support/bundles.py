@@ -43,7 +43,6 @@ def make_bundle(
         layers=layer_specs(1, (4,)),
         tail=TailSpec(name="density", g=0.75),
         metric="display",
-        k_min=1,
         files={name: file_spec(folder / name) for name in FILES},
         onnx=OnnxSpec(opset=17, ir_version=8),
         self_test=SelfTest(

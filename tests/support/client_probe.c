@@ -76,7 +76,7 @@ static void solve(char **argv) {
     if (!diaphane_solve(numbers, numbers + pixels, n, pixels, strtoull(argv[1], NULL, 10), k, &found, &error)) {
         printf("%s\n", error.text);
     } else {
-        printf("%d %d %d %.9g %llu\n", found.k_min, found.complete, found.index, (double)found.log_lambda,
+        printf("%d %d %.9g %llu\n", found.complete, found.index, (double)found.log_lambda,
                (unsigned long long)found.total);
         save(argv[3], k, pixels * sizeof *k);
     }

@@ -29,7 +29,7 @@ def random_shard(
     """A shard of a random dump, in blocks small enough for several of them."""
     dump = random_dump(side, side, max_n, seed)
     curves = error_curves(dump)
-    write_shard(path, dump, curves, lower_hulls(curves, 1), [dump.pixels, 2 * dump.pixels], fraction, kind=kind)
+    write_shard(path, dump, curves, lower_hulls(curves), [dump.pixels, 2 * dump.pixels], fraction, kind=kind)
     with open_columns(path) as file:
         columns, view = file.read(0, file.layout.rows), file.layout.view
     return write_columns(path, columns, view, block_rows)

@@ -24,13 +24,13 @@ from trainer.weights import Layer, Weights
 
 
 def random_view(asset: str, seed: int, size: int = 40, max_n: int = 12) -> ViewData:
-    """Every pixel of a random dump with more than one fragment; scored at 1/4 and 1/2 of its fragments."""
+    """Every pixel of a random dump with fragments; scored at 1/4 and 1/2 of its fragments."""
     dump = random_dump(size, size, max_n, seed)
     curves = error_curves(dump)
-    hulls = lower_hulls(curves, 1)
+    hulls = lower_hulls(curves)
     budgets = [dump.total // 4, dump.total // 2]
     prices = [math.log(found.lam or 1e-9) for found in allocate_curves(dump, curves, budgets, "optimal", hulls)]
-    rows = np.flatnonzero(dump.counts > 1)
+    rows = np.flatnonzero(dump.counts)
     sizes = np.diff(hulls.offsets)[rows]
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     vertices = np.arange(offsets[-1]) + np.repeat(hulls.offsets[rows] - offsets[:-1], sizes)
@@ -38,7 +38,6 @@ def random_view(asset: str, seed: int, size: int = 40, max_n: int = 12) -> ViewD
         asset,
         features=derive(gather(dump))[rows],
         n=dump.counts[rows].astype(np.int32),
-        k_min=1,
         hull=(offsets, hulls.k[vertices], hulls.error[vertices]),
         price_range=(min(prices) - 1.0, max(prices) + 1.0),
         anchors=prices,
@@ -49,7 +48,7 @@ def random_view(asset: str, seed: int, size: int = 40, max_n: int = 12) -> ViewD
 def random_paper_view(asset: str, seed: int, size: int = 40, max_n: int = 12) -> ViewData:
     """`random_view` with what DHOIT's network reads."""
     dump = random_dump(size, size, max_n, seed)
-    pixel = np.flatnonzero(dump.counts > 1)
+    pixel = np.flatnonzero(dump.counts)
     return with_paper_inputs(random_view(asset, seed, size, max_n), dump, pixel, [dump.total // 4, dump.total // 2])
 
 
@@ -85,7 +84,6 @@ def export_random(
         name="random",
         tail=TailSpec(name=tail, g=0.75),
         metric="display",
-        k_min=1,
         provenance=Provenance(scenes={}, code_version="0", seed=0, machine="test"),
         evaluation={},
     )

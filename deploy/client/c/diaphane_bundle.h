@@ -52,7 +52,6 @@ typedef struct {
     char tail[24];              /* what has to be rendered behind the core: "density-16", ... */
     double tail_g;              /* the constant of the tail "density" */
     char metric[24];
-    int k_min;
     DiaphaneHead head;
     int outputs;                /* numbers of an answer */
     DiaphaneOutput output[DIAPHANE_MAX_OUTPUTS];
@@ -76,8 +75,7 @@ typedef struct {
 } DiaphaneBundle;
 
 typedef struct {
-    int k_min;                  /* 1 where the budget covers every pixel with fragments */
-    int complete;               /* it covers every fragment: nothing was solved */
+    int complete;               /* the budget covers every fragment: nothing was solved */
     int32_t index;              /* of the price, as in renderer/shaders/allocation/curve.glsl */
     float log_lambda;           /* minus the price */
     uint64_t total;             /* sum k */
@@ -529,16 +527,15 @@ static int dia__read_tail(DiaphaneBundle *bundle, const dia__json *json) {
     static const char *const tails[] = {"density", "exact-coverage", "weighted-average",
                                         "paper",   "density-8",      "density-16"};
     static const char *const metrics[] = {"display", "linear", "paper"};
-    size_t tail = dia__member(json, 0, "tail"), metric = dia__member(json, 0, "metric"), k_min, i;
+    size_t tail = dia__member(json, 0, "tail"), metric = dia__member(json, 0, "metric"), i;
     if (!dia__has_keys(json, tail, "name g")) return 0;
     if (!dia__number(json, dia__member(json, tail, "g"), &bundle->tail_g) || bundle->tail_g < 0.0) return 0;
     for (i = 0; i < 6 && !dia__is(json, dia__member(json, tail, "name"), tails[i]); ++i) {}
     if (i == 6) return 0;
     strcpy(bundle->tail, tails[i]);
     for (i = 0; i < 3 && !dia__is(json, metric, metrics[i]); ++i) {}
-    if (i == 3 || !dia__whole(json, dia__member(json, 0, "k_min"), 1, &k_min)) return 0;
+    if (i == 3) return 0;
     strcpy(bundle->metric, metrics[i]);
-    bundle->k_min = (int)k_min;
     return 1;
 }
 
@@ -656,11 +653,11 @@ static int dia__read_manifest(DiaphaneBundle *bundle, const dia__json *json, Dia
     int first = format && dia__is(json, format, "diaphane-bundle/1");
     if (format && !first && !dia__is(json, format, "diaphane-bundle/2"))
         return dia__fail(error, "manifest.json is not of the format diaphane-bundle/1 or /2: update this reader");
-    if (!dia__has_keys(json, 0, "format? name head? outputs? features hidden layers tail metric k_min files onnx? "
+    if (!dia__has_keys(json, 0, "format? name head? outputs? features hidden layers tail metric files onnx? "
                                 "self_test? parity provenance evaluation"))
         return dia__fail(error, "manifest.json is not an object with the keys of a bundle, each once");
     if (!dia__read_name(bundle, json)) return dia__fail(error, "manifest.json: the name is not one of a bundle");
-    if (!dia__read_tail(bundle, json)) return dia__fail(error, "manifest.json: unknown tail, metric or k_min");
+    if (!dia__read_tail(bundle, json)) return dia__fail(error, "manifest.json: unknown tail or metric");
     if (!dia__read_outputs(bundle, json)) return dia__fail(error, "manifest.json: unknown head or outputs");
     if (!dia__read_features(bundle, json, error) || !dia__read_layers(bundle, json, error)) return 0;
     if (!dia__read_files(bundle, json, first, error)) return 0;
@@ -978,12 +975,12 @@ static float dia__price(int32_t index) {
 }
 
 /* Each operation is rounded by itself, as in the shaders: `volatile` keeps a compiler from fusing two of them. */
-static uint32_t dia__fragments(const dia__curve *curve, float t, uint32_t k_min) {
+static uint32_t dia__fragments(const dia__curve *curve, float t) {
     volatile float surplus = curve->a + t;
     volatile float steps = surplus * curve->rate;
     volatile float k = steps + 1.5f;
-    float clamped = k, least = (float)k_min, most = (float)curve->most;
-    return (uint32_t)(clamped < least ? least : clamped > most ? most : clamped);
+    float clamped = k, most = (float)curve->most;
+    return (uint32_t)(clamped < 0.0f ? 0.0f : clamped > most ? most : clamped);
 }
 
 static int dia__read_curve(dia__curve *curve, float a, float b, uint32_t n) {
@@ -996,18 +993,17 @@ static int dia__read_curve(dia__curve *curve, float a, float b, uint32_t n) {
     return 1;
 }
 
-/* The greatest price within the budget of the open pixels, then what is left to those that grow at the next one. */
-static void dia__search(const dia__curve *curves, size_t open, uint64_t left, DiaphaneSolution *solution, uint32_t *k,
+/* The greatest price within the budget, then what is left to the pixels that grow at the next one. */
+static void dia__search(const dia__curve *curves, size_t occupied, uint64_t left, DiaphaneSolution *solution, uint32_t *k,
                         const uint32_t *n, size_t pixels) {
     int32_t low = -DIA__LAST, high = DIA__LAST;
-    uint64_t low_sum = open * (uint64_t)solution->k_min;
-    uint32_t k_min = (uint32_t)solution->k_min;
+    uint64_t low_sum = 0;
     size_t i, p;
     while (high - low > 1) {
         int32_t middle = low + (high - low) / 2;
         float t = dia__price(middle);
         uint64_t sum = 0;
-        for (i = 0; i < open; ++i) sum += dia__fragments(&curves[i], t, k_min);
+        for (i = 0; i < occupied; ++i) sum += dia__fragments(&curves[i], t);
         if (sum > left) {
             high = middle;
         } else {
@@ -1020,9 +1016,9 @@ static void dia__search(const dia__curve *curves, size_t open, uint64_t left, Di
     left -= low_sum;
     for (p = i = 0; p < pixels; ++p) {
         uint32_t sure, growth;
-        if (n[p] <= k_min) continue;
-        sure = dia__fragments(&curves[i], dia__price(low), k_min);
-        growth = dia__fragments(&curves[i++], dia__price(high), k_min) - sure;
+        if (!n[p]) continue;
+        sure = dia__fragments(&curves[i], dia__price(low));
+        growth = dia__fragments(&curves[i++], dia__price(high)) - sure;
         if (growth > left) growth = (uint32_t)left;
         k[p] = sure + growth;
         left -= growth;
@@ -1033,31 +1029,29 @@ int diaphane_solve(const float *a, const float *b, const uint32_t *n, size_t pix
                    DiaphaneSolution *solution, DiaphaneError *error) {
     DiaphaneSolution own;
     const uint32_t most = DIAPHANE_MOST_FRAGMENTS;
-    uint64_t total = 0, occupied = 0, settled = 0;
-    size_t p, open = 0;
+    uint64_t total = 0;
+    size_t p, occupied = 0, read = 0;
     dia__curve *curves = NULL;
     memset(&own, 0, sizeof own);
     for (p = 0; p < pixels; ++p) {
         k[p] = n[p] < most ? n[p] : most;
         total += k[p];
         occupied += n[p] > 0;
-        settled += n[p] == 1;
     }
-    own.k_min = budget >= occupied;
     own.complete = budget >= total;
     own.total = own.complete ? total : budget;
-    if (!own.complete) { /* so there are more fragments than pixels that k_min settles: some are open */
-        size_t count = (size_t)(occupied - (own.k_min ? settled : 0));
-        if (count <= (size_t)-1 / sizeof *curves) curves = (dia__curve *)malloc(count * sizeof *curves);
-        if (!curves) return dia__fail(error, "there is no memory for the curves of %lu pixels", (unsigned long)count);
+    if (!own.complete) { /* so there are fragments */
+        if (occupied <= (size_t)-1 / sizeof *curves) curves = (dia__curve *)malloc(occupied * sizeof *curves);
+        if (!curves)
+            return dia__fail(error, "there is no memory for the curves of %lu pixels", (unsigned long)occupied);
         for (p = 0; p < pixels; ++p) {
-            if (n[p] <= (uint32_t)own.k_min) continue;
-            if (!dia__read_curve(&curves[open++], a[p], b[p], k[p])) {
+            if (!n[p]) continue;
+            if (!dia__read_curve(&curves[read++], a[p], b[p], k[p])) {
                 free(curves);
                 return dia__fail(error, "the gain curve of pixel %lu is not finite with b > 0", (unsigned long)p);
             }
         }
-        dia__search(curves, open, budget - (own.k_min ? settled : 0), &own, k, n, pixels);
+        dia__search(curves, occupied, budget, &own, k, n, pixels);
         free(curves);
     }
     if (solution) *solution = own;

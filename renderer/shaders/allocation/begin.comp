@@ -3,19 +3,16 @@
 layout(local_size_x = 256) in;
 #include "allocation/state.glsl"
 
-layout(std430, binding = 4) readonly buffer Blocks { uint sums[]; };  // [blocks, EDGES]: fragments, occupied, singles
+layout(std430, binding = 4) readonly buffer Blocks { uint sums[]; };  // [blocks, EDGES]: fragments, occupied
 uniform uint blocks;
-uniform uint budget;
-shared uvec3 part[256];
+uniform uint fragments;
+shared uvec2 part[256];
 
-void start(uvec3 total) {
-    k_min = uint(budget >= total.y);
+void start(uvec2 total) {
+    budget = fragments;
     complete = uint(budget >= total.x);
-    occupied = total.y;
-    uint settled = k_min * total.z;
-    open_pixels = complete == 1u ? 0u : occupied - settled;
-    left = budget - min(budget, settled);
-    low_sum = k_min * open_pixels;
+    open_pixels = complete == 1u ? 0u : total.y;
+    low_sum = 0u;
     listed = 0u;
     rounds = 0u;
     count_groups[0] = (open_pixels + BLOCK - 1u) / BLOCK;
@@ -24,15 +21,15 @@ void start(uvec3 total) {
 
 void main() {
     uint lane = gl_LocalInvocationIndex;
-    uvec3 own = uvec3(0u);
+    uvec2 own = uvec2(0u);
     for (uint block = lane; block < blocks; block += 256u) {
         uint at = block * EDGES;
-        own = uvec3(add(own.x, sums[at]), own.y + sums[at + 1u], own.z + sums[at + 2u]);
+        own = uvec2(add(own.x, sums[at]), own.y + sums[at + 1u]);
     }
     part[lane] = own;
     barrier();
     if (lane > 0u) return;
-    for (uint i = 1u; i < 256u; ++i) own = uvec3(add(own.x, part[i].x), own.yz + part[i].yz);
+    for (uint i = 1u; i < 256u; ++i) own = uvec2(add(own.x, part[i].x), own.y + part[i].y);
     start(own);
     // A warm start counts closely around the last answer: if this frame's is there, the next round finds it.
     int first = low / EDGES * EDGES - EDGES * EDGES / 2;

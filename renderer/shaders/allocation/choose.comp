@@ -22,7 +22,7 @@ void main() {
         for (uint j = 0u; j < EDGES; ++j) {
             uint sum = 0u;
             for (uint slice = 0u; slice < SLICES; ++slice) sum = add(sum, part[slice * EDGES + j]);
-            if (sum > left) {
+            if (sum > budget) {
                 found_high = edge[j];
                 break;
             }

@@ -18,19 +18,19 @@ void main() {
         at[lane] = price(edge[lane]);
         bin[lane] = 0u;
     }
-    vec4 own[OWN];  // a, 1 / b, least, most; beyond the list there are none at any price
+    vec3 own[OWN];  // a, 1 / b, most; beyond the list there are none at any price
     for (uint i = 0u; i < OWN; ++i) {
         uint place = gl_WorkGroupID.x * BLOCK + i * 128u + lane;
         bool is_open = place < open_pixels;
         uint p = is_open ? pixel[place] : 0u;
-        own[i] = is_open ? vec4(curve[p], float(k_min), float(usable(n[p]))) : vec4(0.0);
+        own[i] = is_open ? vec3(curve[p], float(usable(n[p]))) : vec3(0.0);
     }
     barrier();
     for (uint j = 0u; j < EDGES; ++j) {
         uint here = (j + lane) % EDGES;  // neighbours add to different bins
         float t = at[here];
         uint sum = 0u;
-        for (uint i = 0u; i < OWN; ++i) sum += fragments_at(t, own[i].x, own[i].y, own[i].z, own[i].w);
+        for (uint i = 0u; i < OWN; ++i) sum += fragments_at(t, own[i].x, own[i].y, own[i].z);
         atomicAdd(bin[here], sum);
     }
     barrier();

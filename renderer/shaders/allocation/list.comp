@@ -1,5 +1,5 @@
 #version 450
-// The open pixels, in any order: what follows costs nothing for the others.
+// The pixels with fragments, in any order: what follows costs nothing for the others.
 layout(local_size_x = 256) in;
 #include "allocation/state.glsl"
 
@@ -16,7 +16,7 @@ void main() {
     uint own[BLOCK / 256u];
     for (uint i = 0u; i < BLOCK / 256u; ++i) {
         uint p = gl_WorkGroupID.x * BLOCK + i * 256u + lane;
-        own[i] = p < pixels && n[p] > k_min ? atomicAdd(found, 1u) : CEILING;
+        own[i] = p < pixels && n[p] > 0u ? atomicAdd(found, 1u) : CEILING;
     }
     barrier();
     if (lane == 0u) base = atomicAdd(listed, found);

@@ -29,7 +29,7 @@ void main() {
         part[lane] += other;
     }
     uvec2 before = add(sums[block], part[lane] - own);
-    uint spare = complete == 1u ? 0u : left - low_sum;
+    uint spare = complete == 1u ? 0u : budget - low_sum;
     for (uint i = 0u; i < OWN; ++i) {
         uint p = first + i;
         if (p <= pixels) offset[p] = before.x + min(before.y, spare);

@@ -5,8 +5,8 @@ uniform uint pixels;
 
 uvec2 slots_of(uint p) {
     uint most = p < pixels ? usable(n[p]) : 0u;
-    if (complete == 1u || most <= k_min) return uvec2(most, 0u);
+    if (complete == 1u || most == 0u) return uvec2(most, 0u);
     float gain = curve[p].x, steps = curve[p].y;
-    uint sure = fragments_at(price(low), gain, steps, float(k_min), float(most));
-    return uvec2(sure, fragments_at(price(high), gain, steps, float(k_min), float(most)) - sure);
+    uint sure = fragments_at(price(low), gain, steps, float(most));
+    return uvec2(sure, fragments_at(price(high), gain, steps, float(most)) - sure);
 }

@@ -1,12 +1,10 @@
 // What the passes of an allocation tell each other (renderer/allocation/gpu.py: STATE); `warm` and `low` stay for the
 // next frame.
 layout(std430, binding = 0) buffer State {
-    uint k_min;        // 1 where the budget covers every occupied pixel
-    uint complete;     // 1 where it covers every fragment: nothing is predicted or solved
-    uint occupied;     // pixels with fragments
-    uint open_pixels;  // of them those whose k their count alone does not settle
-    uint left;         // budget of the open pixels
-    uint low_sum;      // their fragments at `low`
+    uint complete;     // 1 where the budget covers every fragment: nothing is predicted or solved
+    uint open_pixels;  // pixels with fragments, unless it does
+    uint budget;       // fragments to spend
+    uint low_sum;      // what is spent at `low`
     uint listed;       // cursor of the list
     uint rounds;       // that counted
     uint warm;         // 1: `low` is the answer of an earlier frame

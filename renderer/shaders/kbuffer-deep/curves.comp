@@ -1,6 +1,6 @@
 #version 450
-// The bundle's network on the gathered sums of every open pixel, for the allocation within the frame: a and 1 / b of
-// log gain(k) = a - b (k-1). Pixels whose k their count alone settles have none; 1 / b is stored so that every later pass
+// The bundle's network on the gathered sums of every pixel with fragments, for the allocation within the frame: a and 1 / b of
+// log gain(k) = a - b (k-1). Pixels without fragments have none; 1 / b is stored so that every later pass
 // has the same number. With OUTPUTS 1 the network answers an importance w, whose curve is k = floor(t w) at the price t
 // (renderer/allocation/lattice.py: importance_curves).
 layout(local_size_x = 64) in;
@@ -21,7 +21,7 @@ float within(float x, float least, float most) {
 void main() {
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     uint p = 64u * group + gl_LocalInvocationIndex;
-    if (p >= pixels || complete == 1u || count[p] <= k_min) return;
+    if (p >= pixels || complete == 1u || count[p] == 0u) return;
     float x[DIAPHANE_FEATURES];
     read_features(int(p), x);
 #if OUTPUTS == 1

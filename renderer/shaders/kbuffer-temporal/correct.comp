@@ -24,7 +24,7 @@ void main() {
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     uint p = 64u * group + gl_LocalInvocationIndex;
     if (p >= pixels) return;
-    if (complete == 1u || count[p] <= k_min) {
+    if (complete == 1u || count[p] == 0u) {
         memory[p] = NOTHING;
         return;
     }

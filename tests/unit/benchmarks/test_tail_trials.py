@@ -110,7 +110,7 @@ def test_rows_have_the_hull_of_every_factor(view: FactorView) -> None:
     assert len(view.by_factor) == len(FACTORS)
     part = view.part(np.arange(5, 40, 3))
     for factor, whole, other in zip(FACTORS, view.by_factor, part.by_factor, strict=True):
-        start = lower_hulls(error_curves(DUMP, "density", g=factor), 1)
+        start = lower_hulls(error_curves(DUMP, "density", g=factor))
         for given_view in (whole, other):
             assert np.array_equal(given_view.n, (view if given_view is whole else part).n)
             gained = np.add.reduceat(

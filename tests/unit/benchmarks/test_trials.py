@@ -120,7 +120,7 @@ def test_a_view_that_is_gone_has_no_rows(tmp_path: Path) -> None:
     halves = sorted((remapped(one, remap) for remap in REMAPS["cuts"]), key=lambda half: half.total)
     assert [half.total for half in halves] == [0, DUMP.total]
     curves = error_curves(halves[0], "density-16")
-    write_shard(tmp_path / "none.safetensors", halves[0], curves, lower_hulls(curves, 1), [DUMP.pixels])
+    write_shard(tmp_path / "none.safetensors", halves[0], curves, lower_hulls(curves), [DUMP.pixels])
     assert len(read_shard(tmp_path / "none.safetensors").n) == 0
 
 

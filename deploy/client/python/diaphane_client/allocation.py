@@ -18,7 +18,7 @@ MOST_FRAGMENTS: Final = 60_000
 _SHIFT: Final = 9
 """Digits of float32 that prices do without."""
 _LAST: Final = 115 << (23 - _SHIFT)
-"""Index of the greatest price, 2^115: at the ends of the lattice every curve gives n and k_min."""
+"""Index of the greatest price, 2^115: at the ends of the lattice every curve gives n and 0."""
 _MOST_GAIN: Final = 2.0**100
 _LEAST_DECAY: Final = 2.0**-12
 _MOST_DECAY: Final = 2.0**98
@@ -32,8 +32,8 @@ def allocate(
 ) -> tuple[NDArray[np.int32], float]:
     """Counts of predicted gain curves at the one lambda that uses a budget.
 
-    `k = clamp(floor(1.5 + (a - log lambda) / b), k_min, n)`; k_min is 1 where the budget covers every occupied pixel,
-    else 0. What is left goes to the pixels that grow at the next lower lambda, by index.
+    `k = clamp(floor(1.5 + (a - log lambda) / b), 0, n)`. What is left goes to the pixels that grow at the next lower
+    lambda, by index.
 
     Args:
         a: [P], log gain of the first fragment.
@@ -54,34 +54,28 @@ def allocate(
     usable = _usable(n, F)
     if usable.sum() <= F:
         return usable.astype(np.int32), -math.inf
-    k_min = _k_min(usable, F)
-    opened = np.flatnonzero(usable > k_min)
-    most = usable[opened]
     # Of NaN and another number, fmin and fmax are the other.
-    offset = np.fmin(np.fmax(gain[opened], -_MOST_GAIN), _MOST_GAIN).astype(np.float32)
-    slope = np.fmax(np.fmin(decay[opened], _MOST_DECAY), _LEAST_DECAY).astype(np.float32)
+    offset = np.fmin(np.fmax(gain, -_MOST_GAIN), _MOST_GAIN).astype(np.float32)
+    slope = np.fmax(np.fmin(decay, _MOST_DECAY), _LEAST_DECAY).astype(np.float32)
     rate = np.float32(1.0) / slope
 
     def counts(index: int) -> NDArray[np.int64]:
         k = np.floor((offset + _price(index)) * rate + np.float32(1.5))
-        return np.asarray(np.clip(k, np.float32(k_min), most.astype(np.float32)), dtype=np.int64)
+        return np.asarray(np.clip(k, np.float32(0.0), usable.astype(np.float32)), dtype=np.int64)
 
-    k = np.minimum(usable, k_min)
-    left = F - int(k.sum()) + k_min * len(opened)
-    low, high = -_LAST, _LAST  # the counts at low are within what is left, those at high are not
+    low, high = -_LAST, _LAST  # the counts at low are within the budget, those at high are not
     while high - low > 1:
         middle = (low + high) // 2
-        low, high = (middle, high) if counts(middle).sum() <= left else (low, middle)
-    k[opened] = _spent(counts(low), counts(high), left)
-    return k.astype(np.int32), -float(_price(low))
+        low, high = (middle, high) if counts(middle).sum() <= F else (low, middle)
+    return _spent(counts(low), counts(high), F).astype(np.int32), -float(_price(low))
 
 
 def fill(weights: NDArray[np.floating], n: NDArray[np.integer], F: int) -> NDArray[np.int32]:
-    """Counts in proportion to weights: floor, clamp to k_min and n, the remainder by largest fraction, then by index.
+    """Counts in proportion to weights: floor, clamp to n, the remainder by largest fraction, then by index.
 
     Args:
-        weights: [P], finite, >= 0. Pixels of weight 0 get more than k_min only once all others are full.
-        n: int [P], as for `allocate`; so is k_min.
+        weights: [P], finite, >= 0. Pixels of weight 0 get fragments only once all others are full.
+        n: int [P], as for `allocate`.
         F: Fragments to spend.
 
     Returns:
@@ -96,27 +90,24 @@ def fill(weights: NDArray[np.floating], n: NDArray[np.integer], F: int) -> NDArr
     usable = _usable(n, F)
     if usable.sum() <= F:
         return usable.astype(np.int32)
-    k_min = _k_min(usable, F)
-    k = np.minimum(usable, k_min)
-    opened = np.flatnonzero(usable > k_min)
-    shares, most = shares[opened], usable[opened]
-    weighted = shares > _LEAST_WEIGHT * shares.max()
-    left = F - int(k.sum()) + k_min * len(opened) - k_min * int(np.count_nonzero(~weighted))
-    if left >= most[weighted].sum():
-        k[opened[weighted]] = most[weighted]
-        rest = opened[~weighted]
-        k[rest] = _by_scale(np.ones(len(rest)), usable[rest], F - int(k.sum()) + k_min * len(rest), k_min)
+    # Weights of pixels without fragments take no part in what is small beside the largest.
+    largest = shares[usable > 0].max()
+    weighted = shares > _LEAST_WEIGHT * largest
+    if F >= usable[weighted].sum():
+        k = np.where(weighted, usable, 0)
+        k[~weighted] = _by_scale(np.ones(int(np.count_nonzero(~weighted))), usable[~weighted], F - int(k.sum()))
     else:
-        k[opened[weighted]] = _by_scale(shares[weighted] / shares.max(), most[weighted], left, k_min)
+        k = np.zeros_like(usable)
+        k[weighted] = _by_scale(shares[weighted] / largest, usable[weighted], F)
     return k.astype(np.int32)
 
 
-def _by_scale(shares: NDArray[np.float64], n: NDArray[np.int64], left: int, k_min: int) -> NDArray[np.int64]:
-    """`clamp(floor(scale * shares), k_min, n)` at the largest scale within a budget, and the next one for the rest."""
+def _by_scale(shares: NDArray[np.float64], n: NDArray[np.int64], left: int) -> NDArray[np.int64]:
+    """`min(floor(scale * shares), n)` at the largest scale within a budget, and the next one for the rest."""
 
     def counts(bits: int) -> NDArray[np.int64]:
         scale = np.array([bits]).view(np.float64)[0]
-        return np.asarray(np.clip(np.floor(scale * shares), k_min, n), dtype=np.int64)
+        return np.asarray(np.minimum(np.floor(scale * shares), n), dtype=np.int64)
 
     # Float64 numbers that are not negative have the order of their bits.
     enough = np.array([2.0 * float((n / shares).max(initial=1.0))])
@@ -148,10 +139,6 @@ def _usable(n: NDArray[np.integer], F: int) -> NDArray[np.int64]:
     if F < 0:
         raise ValueError("the budget must not be negative")
     return np.minimum(counts.astype(np.int64), MOST_FRAGMENTS)
-
-
-def _k_min(usable: NDArray[np.int64], F: int) -> int:
-    return int(np.count_nonzero(usable) <= F)
 
 
 def _numbers(values: NDArray[np.floating], n: NDArray[np.integer]) -> NDArray[np.float64]:

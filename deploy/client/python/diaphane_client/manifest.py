@@ -34,7 +34,7 @@ HEADS: Final[Mapping[str, tuple[tuple[str, ...], ...]]] = {
 _FORMATS: Final = ("diaphane-bundle/1", "diaphane-bundle/2")
 _ALWAYS: Final = frozenset(
     (
-        *("format", "name", "features", "hidden", "layers", "tail", "metric", "k_min", "files"),
+        *("format", "name", "features", "hidden", "layers", "tail", "metric", "files"),
         *("parity", "provenance", "evaluation"),
     )
 )

@@ -1,16 +1,16 @@
 // From the blocks' totals to what the frame has to solve, and where the first round counts. One work group.
-@group(0) @binding(0) var<storage, read> blocks: array<vec4u>;  // fragments, occupied, singles, deepest
+@group(0) @binding(0) var<storage, read> blocks: array<vec3u>;  // fragments, occupied, deepest
 @group(0) @binding(1) var<storage, read_write> state: State;
 @group(0) @binding(2) var<uniform> budget: u32;
-var<workgroup> part: array<vec4u, 256>;
+var<workgroup> part: array<vec3u, 256>;
 
-fn joined(one: vec4u, two: vec4u) -> vec4u {
-    return vec4u(add(one.x, two.x), one.yz + two.yz, max(one.w, two.w));
+fn joined(one: vec3u, two: vec3u) -> vec3u {
+    return vec3u(add(one.x, two.x), one.y + two.y, max(one.z, two.z));
 }
 
 @compute @workgroup_size(256)
 fn begin(@builtin(local_invocation_index) lane: u32) {
-    var own = vec4u(0u);
+    var own = vec3u(0u);
     for (var block = lane; block < arrayLength(&blocks); block += 256u) {
         own = joined(own, blocks[block]);
     }
@@ -24,10 +24,9 @@ fn begin(@builtin(local_invocation_index) lane: u32) {
     }
     state.fragments = own.x;
     state.occupied = own.y;
-    state.deepest = own.w;
-    state.k_min = select(0u, 1u, budget >= own.y);
+    state.deepest = own.z;
     state.complete = select(0u, 1u, budget >= own.x);
-    state.left = budget - min(budget, state.k_min * own.z);
+    state.budget = budget;
     state.low = -LAST;
     state.high = LAST;
     // A warm start counts closely around the last answer: if this frame's is there, the next round finds it.

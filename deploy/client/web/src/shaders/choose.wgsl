@@ -20,7 +20,7 @@ fn choose(@builtin(local_invocation_index) lane: u32) {
         for (var slice = 0u; slice < SLICES; slice++) {
             sum = add(sum, part[slice * u32(EDGES) + j]);
         }
-        if (sum > state.left) {
+        if (sum > state.budget) {
             state.high = state.edge[j];
             break;
         }

@@ -1,4 +1,4 @@
-// Fragments of the open pixels of every block at every edge.
+// Fragments of the pixels of every block at every edge.
 @group(0) @binding(0) var<storage, read> state: State;
 @group(0) @binding(1) var<storage, read> statistics: array<Statistics>;
 @group(0) @binding(2) var<storage, read> curves: array<vec2f>;
@@ -16,12 +16,12 @@ fn count_prices(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
         at[lane] = price(state.edge[lane]);
     }
     var own: array<vec2f, OWN>;
-    var most: array<u32, OWN>;  // 0: it is not open, and has none at any price
+    var most: array<u32, OWN>;  // 0: it has none at any price
     for (var i = 0u; i < OWN; i++) {
         let p = group.x * BLOCK + i * 128u + lane;
         if (p < arrayLength(&statistics)) {
             let n = usable(statistics[p].n);
-            if (n > state.k_min && state.complete == 0u) {
+            if (n > 0u && state.complete == 0u) {
                 own[i] = curves[p];
                 most[i] = n;
             }
@@ -32,7 +32,7 @@ fn count_prices(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
         let here = (j + lane) % u32(EDGES);  // neighbours add to different bins
         var sum = 0u;
         for (var i = 0u; i < OWN; i++) {
-            sum += fragments_at(at[here], own[i], min(state.k_min, most[i]), most[i]);
+            sum += fragments_at(at[here], own[i], most[i]);
         }
         atomicAdd(&bin[here], sum);
     }

@@ -10,11 +10,11 @@ var<workgroup> growth: atomic<u32>;
 
 fn slots_of(p: u32) -> vec2u {
     let most = usable(statistics[p].n);
-    if (state.complete == 1u || most <= state.k_min) {
+    if (state.complete == 1u || most == 0u) {
         return vec2u(most, 0u);
     }
-    let low = fragments_at(price(state.low), curves[p], state.k_min, most);
-    return vec2u(low, max(fragments_at(price(state.high), curves[p], state.k_min, most), low) - low);
+    let low = fragments_at(price(state.low), curves[p], most);
+    return vec2u(low, max(fragments_at(price(state.high), curves[p], most), low) - low);
 }
 
 @compute @workgroup_size(256)
