@@ -74,7 +74,7 @@ def allocate(
         Problem: An argument cannot be used; it says which and what to give instead.
     """
     _one_of("rule", rule, RULES)
-    _one_of("tail", tail, TAILS)
+    _one_of("tail", tail, tuple(TAILS))
     _one_of("metric", metric, METRICS)
     _one_of("fill", fill, get_args(FillName))
     if not isinstance(vkb, VkbOptions):

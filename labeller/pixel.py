@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from labeller.reference import Pixel, tail_weights
 from schemas.colour import linear_to_srgb
-from schemas.tail import DENSITY_G, MetricName, TailName
+from schemas.tail import DENSITY_G, TAILS, MetricName, TailKind, TailName
 
 _ROUNDING = 1e-24
 """Squared differences below this are the rounding of sums, as in `labeller.curve_kernels`."""
@@ -36,7 +36,7 @@ def colours(pixel: Pixel, tail: TailName, g: float = DENSITY_G) -> NDArray[np.fl
     total, mean = _from_behind(weight), _from_behind(weight[:, None] * pixel.colour)
     mean /= np.where(total > 0.0, total, 1.0)[:, None]
     through = _behind(pixel, tail)
-    opacity = np.where(total > 0.0, 1.0 if tail == "paper" else 1.0 - through, 0.0)
+    opacity = np.where(total > 0.0, 1.0 if TAILS[tail].kind == TailKind.PAPER else 1.0 - through, 0.0)
     through = np.where(total > 0.0, through, 1.0)
     behind = opacity[:, None] * mean + through[:, None] * pixel.background
     return np.asarray(core + passes[:, None] * behind)
@@ -78,7 +78,7 @@ def hull(error: NDArray[np.float32]) -> list[int]:
 
 def _behind(pixel: Pixel, tail: TailName) -> NDArray[np.float64]:
     """float64 [n+1]: what passes the tail behind the first k fragments."""
-    if tail in ("weighted-average", "paper"):
+    if TAILS[tail].kind in (TailKind.WEIGHTED_AVERAGE, TailKind.PAPER):
         count = np.arange(pixel.n, -1, -1)
         mean = _from_behind(pixel.alpha) / np.maximum(count, 1)
         return np.asarray(np.maximum(1.0 - mean, 0.0) ** count)

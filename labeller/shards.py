@@ -35,7 +35,7 @@ from renderer.features import derive, gather
 from schemas.fragments import FragmentDump
 from schemas.pixel_weights import DEFAULT_WEIGHTS, PixelWeights, without_default
 from schemas.problem import ExitCode, Problem
-from schemas.tail import DENSITY_BINS, MetricName, TailName
+from schemas.tail import MetricName, TailName
 
 SHARES: Final = (0.05, 0.1, 0.25, 0.4, 0.6, 0.8, 0.9)
 """Budgets, as shares of the view's fragments, at which every shard knows the price."""
@@ -189,7 +189,7 @@ def write_shard(
         levels=_levels(dump, curves, hulls, budgets),
     )
     sampled = sample_pixels(occupied, dump.counts[occupied], sampling)
-    columns = _columns(dump, DENSITY_BINS.get(curves.tail, 0), hulls, sampled)
+    columns = _columns(dump, curves.tail, hulls, sampled)
     return write_columns(path, columns, meta.model_dump(mode="json"))
 
 
@@ -295,7 +295,7 @@ def _check_values(shard: Shard) -> None:
         raise Damage(f"it has {', '.join(wrong)}")
 
 
-def _columns(dump: FragmentDump, bins: int, hulls: Hulls, pixel: NDArray[np.int64]) -> Columns:
+def _columns(dump: FragmentDump, tail: TailName, hulls: Hulls, pixel: NDArray[np.int64]) -> Columns:
     """What the file holds of the rows: of each hull segment its length, and the error at its start."""
     vertices = np.diff(hulls.offsets)[pixel]
     segments = np.maximum(vertices - 1, 0)
@@ -305,7 +305,7 @@ def _columns(dump: FragmentDump, bins: int, hulls: Hulls, pixel: NDArray[np.int6
     n = dump.counts[pixel]
     count = np.uint16 if n.max(initial=0) < 1 << 16 else np.uint32
     return {
-        "features": derive(gather(dump, bins)[pixel]),
+        "features": derive(gather(dump, tail)[pixel]),
         "n": n.astype(count),
         "pixel": pixel.astype(np.uint32),
         "hull_segments": segments.astype(count),

@@ -37,17 +37,19 @@ AnyView = TypeVar("AnyView")
 
 @dataclass(frozen=True)
 class PaperInputs:
-    """What DHOIT's network reads beside the colours (METHOD.md section 4), and the budgets of its labels.
+    """What DHOIT's network reads of the rows (METHOD.md section 4), and the budgets of its labels.
 
     Attributes:
         depth: float32 [R, 2], window depth of the nearest and of the farthest fragment.
-        scene_depth: The same of the whole view.
+        colours: float32 [R, 6], mean and nearest stored RGB, 0 to 1.
+        scene_depth: Window depth of the whole view's nearest and farthest fragment.
         fragments: N, fragments of the view.
         pixels: Pixels of the view.
         budgets: F of each of the view's `anchors`.
     """
 
     depth: NDArray[np.float32]
+    colours: NDArray[np.float32]
     scene_depth: tuple[float, float]
     fragments: int
     pixels: int
@@ -118,7 +120,8 @@ class ViewData:
             slopes=self.slopes[segments],
             lengths=self.lengths[segments],
             sampled_pixels=self.sampled_pixels * len(chosen) / max(1, self.rows),
-            paper=self.paper and replace(self.paper, depth=self.paper.depth[chosen]),
+            paper=self.paper
+            and replace(self.paper, depth=self.paper.depth[chosen], colours=self.paper.colours[chosen]),
         )
 
     def moments(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -129,7 +132,7 @@ class ViewData:
         """sha256 over what is trained on."""
         hasher = hashlib.sha256(self.asset.encode())
         arrays = [self.features, self.n, self.offsets, self.slopes, self.lengths, self.anchors]
-        for array in arrays + ([self.paper.depth] if self.paper is not None else []):
+        for array in arrays + ([self.paper.depth, self.paper.colours] if self.paper is not None else []):
             hasher.update(np.ascontiguousarray(array).tobytes())
         return hasher.digest()
 

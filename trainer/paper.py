@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.allocation.fill import budget_fill, paper_fill
-from renderer.features import FEATURES
 from schemas.fragments import FragmentDump
 from schemas.problem import Problem
 from trainer.dataset import GROUP, Drawing, PaperInputs, ViewData, draw_views
@@ -25,14 +24,11 @@ from trainer.weights import Weights
 Fill = Literal["paper", "budget"]
 """`paper`: Eq. 3, floor alone; `budget`: floor, clamp, and the remainder by largest fraction."""
 
-_COLOURS: Final = tuple(f"{name}_{c}" for name in ("rgb_mean", "rgb_nearest") for c in "rgb")
 PAPER_FEATURES: Final = (
     *("n_share", "budget_share", "depth_near", "depth_far", "scene_depth_near", "scene_depth_far"),
-    *_COLOURS,
+    *(f"{name}_{c}" for name in ("rgb_mean", "rgb_nearest") for c in "rgb"),
 )
 """n / N, F / N, window depth of the pixel's nearest and farthest fragment and of the view's, mean and nearest RGB."""
-
-_COLUMNS: Final = [FEATURES.index(name) for name in _COLOURS]
 
 LABEL_PEAK: Final = 16.0
 """A repaired label is 1 where a pixel gets this many times the mean share of a pixel, and beyond."""
@@ -60,6 +56,7 @@ def with_paper_inputs(
         view,
         paper=PaperInputs(
             depth=_window(depth, near, far).astype(np.float32),
+            colours=_colours(dump, first, last + 1),
             scene_depth=(float(bounds[0]), float(bounds[1])),
             fragments=dump.total,
             pixels=dump.pixels,
@@ -79,7 +76,7 @@ def paper_inputs(view: ViewData, rows: NDArray[np.int64] | slice, budget: int) -
     x = np.empty((len(n), len(PAPER_FEATURES)), dtype=np.float32)
     x[:, 0], x[:, 1] = n / about.fragments, budget / about.fragments
     x[:, 2:4], x[:, 4:6] = about.depth[rows], about.scene_depth
-    x[:, 6:] = view.features[rows][:, _COLUMNS]
+    x[:, 6:] = about.colours[rows]
     return x
 
 
@@ -144,6 +141,14 @@ def importance_counts(weights: Weights, view: ViewData, level: int, budget: int,
 def _window(depth: NDArray[np.floating], near: float, far: float) -> NDArray[np.float64]:
     """`gl_FragCoord.z` of a depth along the view axis, in [0, 1] from the near to the far plane."""
     return np.asarray((1.0 - near / depth.astype(np.float64)) * (far / max(far - near, 1e-30)))
+
+
+def _colours(dump: FragmentDump, first: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.float32]:
+    """float32 [R, 6], mean and nearest stored RGB / 255 of some lists, none of them empty."""
+    before = np.zeros((dump.total + 1, 3))
+    np.cumsum(dump.rgba[:, :3] / 255.0, axis=0, out=before[1:])
+    mean = (before[end] - before[first]) / (end - first)[:, None]
+    return np.concatenate([mean, dump.rgba[first, :3] / 255.0], axis=1).astype(np.float32)
 
 
 def _about(view: ViewData) -> PaperInputs:

@@ -1,28 +1,34 @@
 #version 450
-// Fragments and occupied pixels of every block.
+// Fragments that can be in a core, and occupied pixels.
 layout(local_size_x = 256) in;
 #include "allocation/state.glsl"
+#include "allocation/bins.glsl"
 
-layout(std430, binding = 1) readonly buffer Counts { uint n[]; };
-layout(std430, binding = 4) writeonly buffer Blocks { uint sums[]; };  // [blocks, EDGES], two are used
 uniform uint pixels;
-shared uint fragments, filled;
+shared uint found, filled;
 
 void main() {
-    uint lane = gl_LocalInvocationIndex, block = gl_WorkGroupID.x;
-    if (lane == 0u) fragments = filled = 0u;
+    uint lane = gl_LocalInvocationIndex;
+    if (lane == 0u) found = filled = 0u;
     barrier();
-    uvec2 own = uvec2(0u);
-    for (uint i = 0u; i < BLOCK / 256u; ++i) {
-        uint p = block * BLOCK + i * 256u + lane;
-        uint count = p < pixels ? usable(n[p]) : 0u;
-        own += uvec2(count, min(count, 1u));
+    uint sum = 0u, some = 0u;
+    for (uint i = 0u; i < uint(BLOCK) / 256u; ++i) {
+        uint p = gl_WorkGroupID.x * uint(BLOCK) + i * 256u + lane;
+        if (p >= pixels || known_fragments(p) == 0u) continue;
+        ++some;
+        uint before = 0u;
+        for (uint bin = 0u; bin < uint(BINS); ++bin) {
+            uint own = usable(p, bin, before);
+            if (own == uint(FULL)) break;
+            before += own;
+        }
+        sum += before;
     }
-    atomicAdd(fragments, own.x);
-    atomicAdd(filled, own.y);
+    atomicAdd(found, sum);
+    atomicAdd(filled, some);
     barrier();
     if (lane == 0u) {
-        sums[block * EDGES] = fragments;
-        sums[block * EDGES + 1u] = filled;
+        atomicAdd(fragments, found);
+        atomicAdd(occupied, filled);
     }
 }

@@ -6,13 +6,13 @@
 #extension GL_NV_shader_atomic_int64 : require
 layout(early_fragment_tests) in;
 #include "common/surface.glsl"
+uniform int width;
 #if TAIL >= 0
 #include "kbuffer/tail.glsl"
 #endif
 
 layout(std430, binding = 0) readonly buffer Offsets { uint offset[]; };  // [P+1]
 layout(std430, binding = 2) coherent buffer Slots { uint64_t slot[]; };
-uniform int width;
 
 void main() {
     uvec4 stored = stored_surface();

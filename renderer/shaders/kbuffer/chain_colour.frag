@@ -4,6 +4,7 @@
 // TAIL -1: every fragment has a slot.
 layout(early_fragment_tests) in;
 #include "common/surface.glsl"
+uniform int width;
 #if TAIL >= 0
 #include "kbuffer/tail.glsl"
 #endif
@@ -11,7 +12,6 @@ layout(early_fragment_tests) in;
 layout(std430, binding = 0) readonly buffer Offsets { uint offset[]; };  // [P+1]
 layout(std430, binding = 1) readonly buffer Depths { uint depth[]; };
 layout(std430, binding = 2) coherent buffer Colours { uint colour[]; };
-uniform int width;
 
 const uint EMPTY = 0xFFFFFFFFu;
 
