@@ -67,7 +67,6 @@ def export(store: Store, rows: list[ViewRow], network: NetworkSize, tail: TailNa
         name=f"suite-{network}",
         tail=TailSpec(name=tail, g=DENSITY_G),
         metric="display",
-        k_min=1,
         provenance=Provenance(
             scenes={row.asset: row.digest for row in rows},
             code_version=commit() or "unknown",

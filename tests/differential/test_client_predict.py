@@ -15,7 +15,7 @@ from support.dumps import random_dump
 from support.training import random_weights
 
 from diaphane_client import Predictor, Refused, allocate, fill
-from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
+from renderer.allocation.fill import budget_fill, solve_lambda
 from renderer.allocation.lattice import curves_of, price, solve_on_lattice
 from renderer.features import FEATURES, derive, gather
 from schemas.bundle import (
@@ -47,7 +47,6 @@ def written(folder: Path, weights: Weights) -> Path:
         name="glass",
         tail=TailSpec(name="density", g=0.75),
         metric="display",
-        k_min=1,
         provenance=Provenance(scenes={}, code_version="0", seed=0, machine="test"),
         evaluation={},
     )
@@ -82,7 +81,7 @@ def test_counts_are_those_of_the_renderer(head: HeadName, outputs: tuple[OutputN
         assert k.sum() == min(budget, N.sum())
         np.testing.assert_array_equal(predictor.predict(ROWS, budget), k)  # n read from log_n
         if head == "importance":
-            expected = budget_fill(answers[:, 0], N, budget, feasible_k_min(N, budget))
+            expected = budget_fill(answers[:, 0], N, budget)
         else:
             expected = solve_on_lattice(curves_of(answers[:, 0], answers[:, 1]), N, budget).k
         # Another order of the network's sums may move a pixel at the edge; all others are the same.
@@ -120,10 +119,9 @@ def test_allocate_is_the_lattice_to_the_fragment(lists: list[int], data: st.Data
 def test_fill_is_the_budget_fill_but_for_ties(lists: list[int], data: st.DataObject) -> None:
     n = np.minimum(np.array(lists), 60_000)
     weights, budget = drawn(data, n, weight)
-    k, k_min = fill(weights, n, budget), feasible_k_min(n, budget)
-    expected = budget_fill(weights, n, budget, k_min)
+    k, expected = fill(weights, n, budget), budget_fill(weights, n, budget)
     assert k.sum() == expected.sum() == min(budget, n.sum())
-    assert (k >= np.minimum(n, k_min)).all()
+    assert (k >= 0).all()
     assert (k <= n).all()
     different = np.flatnonzero(k != expected)
     shares = np.maximum(k, expected)[different] / np.where(weights[different] > 0.0, weights[different], 1.0)
@@ -136,7 +134,7 @@ def test_the_exact_search_differs_by_ties_alone() -> None:
     a, b = rng.normal(-8.0, 3.0, n.size).astype(np.float32), rng.uniform(0.02, 3.0, n.size).astype(np.float32)
     for budget in (int(np.count_nonzero(n)), int(n.sum() * 0.4), int(n.sum() * 0.9)):
         k, log_lambda = allocate(a, b, n, budget)
-        expected, exact = solve_lambda(a, b, n, budget, feasible_k_min(n, budget))
+        expected, exact = solve_lambda(a, b, n, budget)
         assert abs(log_lambda - exact) < 1e-3  # prices are 2^-11 apart around 10
         assert np.abs(k - expected).sum() <= n.size // 500
 

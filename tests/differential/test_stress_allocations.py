@@ -31,8 +31,7 @@ def test_every_path_is_within_its_bound() -> None:
 
 def test_the_exact_hull_is_the_lowest_convex_curve() -> None:
     error = np.array([9.0, 8.0, 2.0, 1.5, 0.0, 0.0], np.float32)
-    assert [float(x) for x in exact_hull(error, 0)] == [9.0, 5.5, 2.0, 1.0, 0.0]
-    assert [float(x) for x in exact_hull(error, 1)] == [8.0, 2.0, 1.0, 0.0]
+    assert [float(x) for x in exact_hull(error)] == [9.0, 5.5, 2.0, 1.0, 0.0]
 
 
 def violated(monkeypatch: pytest.MonkeyPatch, name: str, broken: Callable[..., Any]) -> set[str]:

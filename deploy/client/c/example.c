@@ -13,7 +13,7 @@ static int spend(const DiaphaneBundle *bundle) {
     float a[PIXELS] = {0}, b[PIXELS] = {0}, y[DIAPHANE_MAX_OUTPUTS], x[DIAPHANE_FEATURES];
     DiaphaneSolution found;
     DiaphaneError error;
-    for (int p = 2; p < PIXELS; ++p) { /* a renderer has sums of its own: diaphane_features */
+    for (int p = 1; p < PIXELS; ++p) { /* a renderer has sums of its own: diaphane_features */
         for (int i = 0; i < bundle->features; ++i)
             x[i] = (float)bundle->test_features[(size_t)p * (size_t)bundle->features + (size_t)i];
         if (!diaphane_predict(bundle, x, y)) return 0;

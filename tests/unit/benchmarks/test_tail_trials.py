@@ -117,7 +117,7 @@ def test_rows_have_the_hull_of_every_factor(view: FactorView) -> None:
                 np.append(given_view.slopes * given_view.lengths, np.float32(0.0)), given_view.offsets[:-1]
             )
             gained[np.diff(given_view.offsets) == 0] = 0.0
-            # What all segments gain is the error of k_min, and of some pixel of the view.
+            # What all segments gain is the error of k = 0, and of some pixel of the view.
             assert np.isin(np.round(gained, 5), np.round(np.append(start.error, np.float32(0.0)), 5)).all()
 
 

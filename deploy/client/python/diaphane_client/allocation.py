@@ -93,7 +93,7 @@ def fill(weights: NDArray[np.floating], n: NDArray[np.integer], F: int) -> NDArr
     # Weights of pixels without fragments take no part in what is small beside the largest.
     largest = shares[usable > 0].max()
     weighted = shares > _LEAST_WEIGHT * largest
-    if F >= usable[weighted].sum():
+    if usable[weighted].sum() <= F:
         k = np.where(weighted, usable, 0)
         k[~weighted] = _by_scale(np.ones(int(np.count_nonzero(~weighted))), usable[~weighted], F - int(k.sum()))
     else:
