@@ -57,7 +57,7 @@ FEATURE_MEANINGS: Final[Mapping[str, str]] = {
         for b in range(1, MOST_BINS)
     },
     **{
-        f"mean_{b}": f"mean position of the optical depth in depth bin {b - 1}, counted from 0, 0..1; 0 where the tail keeps none"
+        f"mean_{b}": f"mean position of the optical depth in depth bin {b - 1}, 0..1; 0 where the tail keeps none"
         for b in range(1, MOST_BINS)
     },
 }

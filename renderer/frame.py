@@ -224,7 +224,7 @@ class Frame:
         return self._counts, *self._range
 
     def tile_range(self) -> moderngl.Buffer:
-        """Depths between which the bins of each tile's pixels lie, uint32 [T, 2], float bits (`renderer.tile_range`)."""
+        """Between which depths each tile's depth bins lie: uint32 [T, 2], float bits (`renderer.tile_range`)."""
         if self._tile_range is None:
             with self.clock.measure("range"):
                 self._tile_range = self._estimated_range()

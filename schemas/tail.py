@@ -78,6 +78,10 @@ TAILS: Final[Mapping[TailName, Tail]] = {
 }
 """Every tail, in the order in which lists show them."""
 
+TAIL_NAMES: Final[tuple[TailName, ...]] = tuple(TAILS)
+BINNED_TAILS: Final[tuple[TailName, ...]] = tuple(name for name, tail in TAILS.items() if tail.bins)
+"""Those with depth bins, which a bundle can be made for: the core of a predicted allocation is whole bins."""
+
 NO_TAIL: Final = -1
 """`TAIL` of shaders where every fragment has a slot."""
 
