@@ -55,7 +55,8 @@ def allocate(
             - `depth`: [N], view-space distance, > 0, not falling within a pixel, in any one unit.
             - `background` (white): uint8 [P, 3] or [3], gamma-2 encoded colour of what lies behind.
             - `facing` (255): uint8 [P], |n . e| * 255 of the nearest fragment, for rule `importance`.
-            - `shape` (one row, or that of `counts`): (H, W), for rule `importance`.
+            - `shape` (one row, or that of `counts`): (H, W), for rule `importance` and the binned tails, whose bins
+              lie between the ends of tiles.
         budgets: Fragment counts F >= 0, in any order; F >= N gives k = n, flagged `exact`.
         rule: One of `labeller.RULES`: `optimal` (certified), `greedy` (DHOIT, Algorithm 1), `increment`, `fixed`,
             `dynamic` (k+-buffer), `importance` (VKB), `uniform`, `proportional`.

@@ -54,7 +54,7 @@ def read_dump(folder: Path) -> FragmentDump:
         raise damaged(folder) from reason
     dump = FragmentDump(width, height, offsets, *arrays)
     columns, rows = tile_grid(width, height)
-    fits = len(tile_ranges(dump)) == columns * rows and len(offsets) - 1 == dump.pixels
+    fits = len(arrays[-1]) == columns * rows and len(offsets) - 1 == dump.pixels
     if not fits or not len(dump.rgba) == dump.total == offsets[-1]:
         raise damaged(folder)
     return dump

@@ -16,6 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from schemas.fragments import FragmentDump
+from schemas.problem import Problem
 from schemas.tail import RANGE_TILE
 
 STEPS: Final = 2
@@ -50,10 +51,19 @@ def pixel_ranges(dump: FragmentDump) -> PixelRanges:
 
 
 def tile_ranges(dump: FragmentDump) -> NDArray[np.float32]:
-    """float32 [T, 2], nearest and farthest depth of a dump's tiles: as they were found, or those of the fragments."""
-    if dump.tile_range is not None:
-        return dump.tile_range
+    """float32 [T, 2], nearest and farthest depth of a dump's tiles: as they were found, or those of the fragments.
+
+    Raises:
+        Problem: Those that were found are not one pair of finite numbers a tile, which compiled code relies on.
+    """
     columns, rows = tile_grid(dump.width, dump.height)
+    if dump.tile_range is not None:
+        found = dump.tile_range
+        if not (found.shape == (rows * columns, 2) and found.dtype == np.float32 and bool(np.isfinite(found).all())):
+            raise Problem(
+                "The fragment dump is malformed: its tiles have no ranges of depths.", "Render the view again."
+            )
+        return found
     ranges = np.zeros((rows * columns, 2), dtype=np.float32)
     _fragment_ranges(dump.offsets, dump.depth, dump.width, columns, ranges)
     return ranges

@@ -87,10 +87,10 @@ def test_of_two_fragments_the_second_is_behind_the_first_one(z: float, near: int
     pixel, row = pixel_of([(z, near), (2.0 * z, far)], None), TAILS[tail]
     optical = optical_of(pixel)
     first, second = reference.binned_exponents(pixel, optical, row)
-    assert first == 0.0
-    steps, units = (0.5 + 1e-9) * optical.sum() / row.share_levels, 2.0 / OPTICAL_UNIT * max(1.0, optical.sum())
-    # Of shares that make its bin seem fuller than it is, as much lies in front of it as of anything at its far end.
-    assert abs(second - optical[0]) <= 2.0 * steps + units
+    # A share that is kept half a step too large seems to be of others in a fragment's bin.
+    step, units = (0.5 + 1e-9) * optical.sum() / row.share_levels, 2.0 / OPTICAL_UNIT * max(1.0, optical.sum())
+    assert 0.0 <= first <= step + units
+    assert abs(second - optical[0]) <= 2.0 * step + units
 
 
 @pytest.mark.parametrize("tail", [name for name in BINNED_TAILS if TAILS[name].mean_levels])

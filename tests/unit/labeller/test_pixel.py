@@ -28,7 +28,7 @@ def test_an_opaque_and_an_invisible_list_have_colours() -> None:
     for p in range(dump.pixels):
         one = reference.pixel_of(dump, p)
         for k, colour in enumerate(pixel.colours(one, "density-16")):
-            np.testing.assert_allclose(colour, reference.composite(one, k), atol=1e-12)
+            np.testing.assert_allclose(colour, reference.composite(one, k, "density-16"), atol=1e-12)
 
 
 def test_hulls_are_those_of_the_view() -> None:

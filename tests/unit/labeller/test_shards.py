@@ -18,17 +18,17 @@ from support.dumps import random_dump
 from support.shards import random_shard
 
 from labeller.columns import COLUMNS
-from labeller.curves import error_curves
+from labeller.curves import error_curves, whole_bins
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
 from labeller.shard_file import open_columns, write_columns
 from labeller.shards import Shard, read_rows, read_shard, write_shard
 from renderer.features import FEATURES, derive, gather
 from schemas.problem import ExitCode, Problem
-from schemas.tail import DEFAULT_TAIL, DENSITY_BINS
+from schemas.tail import DEFAULT_TAIL
 
 DUMP = random_dump(40, 30, 8, seed=1)
-CURVES = error_curves(DUMP)
+CURVES = whole_bins(DUMP, error_curves(DUMP))
 HULLS = lower_hulls(CURVES)
 BUDGETS = [DUMP.pixels, 2 * DUMP.pixels, 40 * DUMP.pixels]
 
@@ -46,7 +46,7 @@ def shard(path: Path) -> Shard:
 
 
 def test_rows_hold_the_hulls_and_features_of_their_pixels(shard: Shard) -> None:
-    features = derive(gather(DUMP, DENSITY_BINS[DEFAULT_TAIL]))
+    features = derive(gather(DUMP, DEFAULT_TAIL))
     assert shard.features.shape == (len(shard.n), len(FEATURES))
     assert np.array_equal(shard.features, features[shard.pixel])
     assert np.array_equal(shard.n, DUMP.counts[shard.pixel])
