@@ -8,7 +8,10 @@ uniform int width;
 void main() {
     uvec4 stored = stored_surface();
 #if MIXED
-    if (!is_transparent(stored)) discard;
+    if (!is_transparent(stored)) {
+        skip_tail();
+        return;
+    }
 #endif
     int p = int(gl_FragCoord.y) * width + int(gl_FragCoord.x);
     accumulate_tail(p, stored, v_depth);

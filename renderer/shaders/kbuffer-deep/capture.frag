@@ -12,14 +12,18 @@ layout(std430, binding = 2) writeonly buffer Pool { uvec2 fragments[]; };  // pa
 void main() {
     uvec4 stored = stored_surface();
 #if MIXED
-    if (!is_transparent(stored)) discard;
+    if (!is_transparent(stored)) {
+        skip_tail();
+        return;
+    }
 #endif
     if (gl_HelperInvocation) return;
     ivec2 xy = ivec2(gl_FragCoord.xy);
     int p = xy.y * width + xy.x, at = p * (BINS / 4);
     if (uint(bin_of(bin_place(v_depth, range_of(xy, width)))) < counts[at]) {
         fragments[atomicAdd(counts[at + 1], 1u)] = uvec2(pack(stored), floatBitsToUint(v_depth));
-        discard;
+        skip_tail();
+        return;
     }
     accumulate_tail(p, stored, v_depth);
 }

@@ -15,10 +15,11 @@ uniform int width;
 void read_features(int p, uint fragments, out float x[DIAPHANE_FEATURES]) {
     ivec2 xy = ivec2(p % width, p / width);
     int tile = xy.y / RANGE_TILE * ((width + RANGE_TILE - 1) / RANGE_TILE) + xy.x / RANGE_TILE;
+    KeptBins kept = kept_at(xy);
     vec4 s[TEXELS];
     for (int i = 0; i < TEXELS; ++i) s[i] = vec4(0.0);
     s[0] = vec4(
-        fragments, optical_depth_at(xy), uintBitsToFloat(tile_range[2 * tile]), uintBitsToFloat(tile_range[2 * tile + 1])
+        fragments, optical_depth_in(kept), uintBitsToFloat(tile_range[2 * tile]), uintBitsToFloat(tile_range[2 * tile + 1])
     );
 #if COLOURS
     s[1] = texelFetch(colours, xy, 0);
@@ -26,7 +27,7 @@ void read_features(int p, uint fragments, out float x[DIAPHANE_FEATURES]) {
 #endif
     s[3] = vec4(texelFetch(background, xy, 0).rgb, 0.0);
     for (int b = 0; b < BINS - 1; ++b) {
-        uint word = kept_of(xy, b);
+        uint word = word_of(kept, b);
         s[4 + b / 4][b % 4] = share_behind(word);
 #if MEAN_LEVELS
         s[8 + b / 4][b % 4] = mean_in(word);

@@ -8,6 +8,16 @@ layout(location = 1) out float tail_opacity;  // sum -ln(1-a)
 layout(location = 1) out vec4 tail_opacity;  // sum -ln(1-a), sum a, count
 #endif
 
+// Adds nothing: cheaper than to discard a fragment, which keeps drivers from blending whole tiles.
+void skip_tail() {
+    tail_colour = vec4(0.0);
+#if TAIL == TAIL_BINNED
+    tail_opacity = 0.0;
+#else
+    tail_opacity = vec4(0.0);
+#endif
+}
+
 void accumulate_tail(int p, uvec4 stored, float z) {
     float a = float(stored.a) / 255.0;
     vec3 root = vec3(stored.rgb) / 255.0;

@@ -21,7 +21,7 @@ float tail_weight(int p, float a, float z) {
     weight *= exp(-min(density_g * optical_depth * x, MAX_EXPONENT));
 #elif TAIL == TAIL_BINNED
     float place = bin_place(z, range_of(ivec2(gl_FragCoord.xy), width));
-    weight *= exp(-min(in_front(ivec2(gl_FragCoord.xy), place, -log(1.0 - a)), MAX_EXPONENT));
+    weight *= exp(-min(in_front(kept_at(ivec2(gl_FragCoord.xy)), place, -log(1.0 - a)), MAX_EXPONENT));
 #endif
     return weight;
 }
