@@ -17,6 +17,8 @@ RANGE, COUNTS = 7, 6
 """Storage bindings of tile ranges and counts by bin, in every shader."""
 KEPT_UNIT = 3
 """First of the texture units of what is kept of the bins, in every shader."""
+TARGETS = 8
+"""Of one pass, at most: what every GL has."""
 _COLOUR_BYTES = 8
 """Of a texture of four half floats."""
 
@@ -66,6 +68,8 @@ class Binned:
 def gather_bins(frame: Frame, name: TailName, *, colours: bool = False, counts: bool = False) -> Binned:
     """Fill the depth bins of every pixel, and pack them in their place.
 
+    Where colours do not fit into the targets beside 16 bins and their means, they are a pass of their own.
+
     Args:
         frame: The view.
         name: A tail with bins.
@@ -80,8 +84,15 @@ def gather_bins(frame: Frame, name: TailName, *, colours: bool = False, counts: 
     ranges.bind_to_storage_buffer(RANGE)
     if counted is not None:
         counted.bind_to_storage_buffer(COUNTS)
-    defines = {**tail.defines, "COLOURS": int(colours), "COUNTS": int(counts)}
-    frame.draw_transparent("gather/bins.frag", frame.target([*bins, *means, *sums]), defines)
+    fits = len(bins) + len(means) + len(sums) <= TARGETS
+    for targets, alone in [(bins + means + sums, 0)] if fits else [(bins + means, 0), (sums, 1)]:
+        defines = {
+            **tail.defines,
+            "ALONE": alone,
+            "COLOURS": int(colours and (fits or alone)),
+            "COUNTS": int(counts and not alone),
+        }
+        frame.draw_transparent("gather/bins.frag", frame.target(targets), defines)
     frame.ctx.memory_barrier()
     frame.target([]).use()  # a context keeps alive what is bound: the targets, long after the last use of them
     _pack(frame, tail, bins, means)

@@ -1,6 +1,7 @@
 #version 450
 // One additive pass for a binned tail and what a predictor reads beside it. In order of location: optical depth by bin;
 // the same times the position in the bin (MEAN_LEVELS); colours (COLOURS). COUNTS: also fragments by bin, 8 bits each.
+// ALONE: nothing but colours, where all do not fit into the targets of one pass.
 layout(early_fragment_tests) in;
 #include "common/surface.glsl"
 #include "common/depth_bins.glsl"
@@ -12,12 +13,16 @@ layout(std430, binding = 6) coherent buffer Counts { uint count[]; };  // [P, BI
 uniform int width;
 
 const int FOURS = BINS / 4;
+#if ALONE
+#define AFTER_MEANS 0
+#else
 layout(location = 0) out vec4 bins[FOURS];  // whole units / BIN_LIMIT: sums are exact, whatever their order
 #if MEAN_LEVELS
 layout(location = FOURS) out vec4 means[FOURS];
 #define AFTER_MEANS (2 * FOURS)
 #else
 #define AFTER_MEANS FOURS
+#endif
 #endif
 #if COLOURS
 layout(location = AFTER_MEANS) out vec4 colours;      // sum l rgb, sum l y luma: l optical depth, y place from 0 to 1
@@ -47,6 +52,7 @@ void main() {
     float optical_depth = -log(1.0 - float(stored.a) / 255.0);
     float place = bin_place(v_depth, range_of(xy, width));
     int bin = bin_of(place);
+#if !ALONE
     precise float units = optical_units(optical_depth);
     precise float moved = units * (place - float(bin)) + 0.5;
     for (int i = 0; i < FOURS; ++i) {
@@ -56,6 +62,7 @@ void main() {
         means[i] = own * (floor(moved) / float(BIN_LIMIT));
 #endif
     }
+#endif
 #if COLOURS
     vec3 rgb = vec3(stored.rgb) / 255.0;
     float y = place / float(BINS);
