@@ -19,7 +19,7 @@ from labeller.rules import allocate_curves
 from labeller.selection import END, Histogram, ascending_keys
 from labeller.streaming import allocate_bands
 from schemas.fragments import FragmentDump
-from schemas.tail import TAILS
+from schemas.tail import RANGE_TILE, TAIL_NAMES
 from services.stress.bounds import PIXEL_FLOOR, counted, within
 from services.stress.cases import Case, curve_cases, dump_of, random_dump, some_list
 from services.stress.findings import Finding, Options, worst_of
@@ -198,20 +198,21 @@ def _never_above(name: str, dump: FragmentDump, curves: Curves) -> Finding:
 def _bands(options: Options) -> Iterator[Finding]:
     """Row bands one after the other against the whole view, for every rule that can be computed so."""
     rng = np.random.default_rng(options.seed)
-    height, width = (12, 20) if options.quick else (48, 64)
+    height, width = (20, 20) if options.quick else (48, 64)
+    bands = (RANGE_TILE, 2 * RANGE_TILE, height)  # whole tiles: depth bins lie between the ends of a tile's range
     for name, ties in (("random view", False), ("depth ties across an image", True)):
         dump = replace(random_dump(rng, height * width, 9, ties), width=width, height=height)
         curves, budgets = error_curves(dump), edge_budgets(dump.counts)
         wrong, where = 0, ""
         for rule in _BY_ERROR:
-            for rows in (1, 5, height):
+            for rows in bands:
                 parts = [_rows_of(dump, first, min(first + rows, height)) for first in range(0, height, rows)]
                 whole = allocate_curves(dump, curves, budgets, rule)
                 for one, other in zip(allocate_bands(partial(list, parts), budgets, rule), whole, strict=True):
                     differ = int((one.k != other.k).sum())
                     if differ:
                         wrong, where = wrong + differ, f"{rule}, {rows} rows a band, F {one.budget}"
-        yield counted("bands", f"{name}, bands of 1, 5 and {height} rows, every F", wrong, where)
+        yield counted("bands", f"{name}, bands of {bands[0]}, {bands[1]} and {height} rows, every F", wrong, where)
 
 
 def _rows_of(dump: FragmentDump, first: int, last: int) -> FragmentDump:
@@ -253,7 +254,7 @@ def _searched(rng: np.random.Generator, tries: int, ties: bool) -> Iterator[tupl
     """Allocations of small views with the true optimum, and which they are."""
     for trial in range(tries):
         dump = random_dump(rng, int(rng.integers(1, 7)), _SMALL // 6, ties)
-        curves = error_curves(dump, TAILS[trial % len(TAILS)])
+        curves = error_curves(dump, TAIL_NAMES[trial % len(TAIL_NAMES)])
         for found in allocate_curves(dump, curves, edge_budgets(dump.counts), "optimal"):
             optimum = reference.optimum(_split(curves), found.budget)
             yield found, optimum, f"view {trial}, F {found.budget}"
