@@ -12,17 +12,21 @@ const uint SIZE = 1u << HALF_BITS;
 shared uint own_counted[SIZE];
 
 void add_events(uint p) {
+    PixelBins bins = bins_of(p);
+    vec2 gain = curve[p];
     uint before = 0u;
-    for (uint bin = 0u; bin < uint(BINS); ++bin) {
-        uint own = usable(p, bin, before);
-        if (own == uint(FULL)) break;
-        if (own == 0u) continue;
-        uint found = rank_of(curve[p], before, before + own);
+    bool is_open = true;
+    for (int bin = 0; bin < BINS; ++bin) {
+        uint own = count_in(bins, bin);
+        is_open = is_open && fits(own, before);
+        if (is_open && own > 0u) {
+            uint found = rank_of(gain, before, before + own);
 #if LOW
-        if (found >> uint(HALF_BITS) == high) atomicAdd(own_counted[found & (SIZE - 1u)], own);
+            if (found >> uint(HALF_BITS) == high) atomicAdd(own_counted[found & (SIZE - 1u)], own);
 #else
-        atomicAdd(own_counted[found >> uint(HALF_BITS)], own);
+            atomicAdd(own_counted[found >> uint(HALF_BITS)], own);
 #endif
+        }
         before += own;
     }
 }
@@ -34,7 +38,7 @@ void main() {
     barrier();
     for (uint i = 0u; i < uint(BLOCK) / 256u; ++i) {
         uint p = gl_WorkGroupID.x * uint(BLOCK) + i * 256u + lane;
-        if (p < pixels && known_fragments(p) > 0u) add_events(p);
+        if (p < pixels) add_events(p);
     }
     barrier();
     for (uint i = lane; i < SIZE; i += 256u)

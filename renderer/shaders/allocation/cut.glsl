@@ -9,19 +9,23 @@ struct Cut {
 
 Cut cut_of(uint p) {
     Cut cut = Cut(0u, 0u, 0u, 0u);
-    if (p >= pixels || known_fragments(p) == 0u) return cut;
+    if (p >= pixels) return cut;
+    PixelBins bins = bins_of(p);
+    vec2 gain = complete == 1u ? vec2(0.0) : curve[p];
     uint before = 0u;
-    for (uint bin = 0u; bin < uint(BINS); ++bin) {
-        uint own = usable(p, bin, before);
-        if (own == uint(FULL)) break;
-        if (own == 0u) continue;
-        uint found = complete == 1u ? 0u : rank_of(curve[p], before, before + own);
-        if (complete == 0u && found > rank) break;
+    bool is_open = true;
+    for (int bin = 0; bin < BINS; ++bin) {
+        uint own = count_in(bins, bin);
+        is_open = is_open && fits(own, before);
+        uint found = complete == 1u ? 0u : rank_of(gain, before, before + own);
         before += own;
-        cut.more_bins = bin + 1u;
-        cut.more_fragments = before;
+        if (!is_open || own == 0u) continue;
+        if (complete == 1u || found <= rank) {
+            cut.more_bins = uint(bin) + 1u;
+            cut.more_fragments = before;
+        }
         if (complete == 1u || found < rank) {
-            cut.bins = bin + 1u;
+            cut.bins = uint(bin) + 1u;
             cut.fragments = before;
         }
     }

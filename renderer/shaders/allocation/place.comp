@@ -36,8 +36,8 @@ void main() {
         uint growth = cuts[i].more_fragments - cuts[i].fragments;
         bool grows = before.y + growth <= spare;
         offset[p] = before.x + min(before.y, spare);
-        counts[p * FOURS] = grows ? cuts[i].more_bins : cuts[i].bins;
-        counts[p * FOURS + 1u] = before.x + min(before.y, spare);
+        counts[p * uint(FOURS)] = grows ? cuts[i].more_bins : cuts[i].bins;
+        counts[p * uint(FOURS) + 1u] = before.x + min(before.y, spare);
         before += uvec2(cuts[i].fragments, growth);
     }
 }

@@ -14,13 +14,15 @@ void main() {
     uint sum = 0u, some = 0u;
     for (uint i = 0u; i < uint(BLOCK) / 256u; ++i) {
         uint p = gl_WorkGroupID.x * uint(BLOCK) + i * 256u + lane;
-        if (p >= pixels || known_fragments(p) == 0u) continue;
-        ++some;
+        if (p >= pixels) continue;
+        PixelBins bins = bins_of(p);
+        some += uint(known_fragments(bins) > 0u);
         uint before = 0u;
-        for (uint bin = 0u; bin < uint(BINS); ++bin) {
-            uint own = usable(p, bin, before);
-            if (own == uint(FULL)) break;
-            before += own;
+        bool is_open = true;
+        for (int bin = 0; bin < BINS; ++bin) {
+            uint own = count_in(bins, bin);
+            is_open = is_open && fits(own, before);
+            before += is_open ? own : 0u;
         }
         sum += before;
     }

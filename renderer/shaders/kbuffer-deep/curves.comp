@@ -21,7 +21,7 @@ void main() {
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     uint p = 64u * group + gl_LocalInvocationIndex;
     if (p >= pixels || complete == 1u) return;
-    uint fragments = known_fragments(p);
+    uint fragments = known_fragments(bins_of(p));
     if (fragments == 0u) return;
     float x[DIAPHANE_FEATURES];
     read_features(int(p), fragments, x);

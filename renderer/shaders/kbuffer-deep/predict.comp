@@ -18,7 +18,7 @@ void main() {
     int i = int(gl_GlobalInvocationID.x) + first;
     if (i >= pixels) return;
     float x[DIAPHANE_FEATURES];
-    read_features(int(pixel[i]), known_fragments(pixel[i]), x);
+    read_features(int(pixel[i]), known_fragments(bins_of(pixel[i])), x);
 #if FEATURES_ONLY
     for (int j = 0; j < DIAPHANE_FEATURES; ++j) feature[(i - first) * DIAPHANE_FEATURES + j] = x[j];
 #elif OUTPUTS == 1

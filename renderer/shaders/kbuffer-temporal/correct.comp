@@ -24,7 +24,7 @@ void main() {
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     uint p = 64u * group + gl_LocalInvocationIndex;
     if (p >= pixels) return;
-    uint fragments = known_fragments(p);
+    uint fragments = known_fragments(bins_of(p));
     if (complete == 1u || fragments == 0u) {
         memory[p] = NOTHING;
         return;
