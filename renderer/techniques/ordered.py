@@ -27,6 +27,9 @@ MAX_NODES = 16
 """Nodes a pixel that the compositing shaders hold in registers. Compilers unroll loops over them; else they would count
 as turns (`renderer.screen.TURNS`)."""
 
+NODE_BYTES = 8
+"""Of a node in both papers: RGBA8 and a depth, or a depth and a transmittance."""
+
 _WORDS = 3
 """Packed colour, depth and rank."""
 
@@ -97,7 +100,8 @@ def render_ordered(frame: Frame, technique: str, nodes: int) -> Rendered:
 
     Returns:
         The picture. `pool_bytes` are those of the captured fragments of the whole window; above the limit of a storage
-        buffer, bands of rows use one part of that size after the other.
+        buffer, bands of rows use one part of that size after the other. `node_bytes` are what the technique would hold
+        instead with interlock.
 
     Raises:
         Problem: A pixel has more fragments than a shader can loop over, or one row more than a storage buffer holds.
@@ -122,5 +126,6 @@ def render_ordered(frame: Frame, technique: str, nodes: int) -> Rendered:
         captured=int(k.sum(dtype=np.int64)),
         pool_bytes=runs.pool_bytes,
         pixel_bytes=PIXEL_BYTES,
+        node_bytes=NODE_BYTES * nodes,
         skips=frame_skips(frame, runs.tiles),
     )

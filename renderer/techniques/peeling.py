@@ -112,7 +112,7 @@ class _Peeling:
                 with self._clock.measure("step"):
                     if number == done + passes - 1 and _LEFT in self._buffers:
                         self._buffers[_LEFT].write(bytes(4))
-                    self._step(is_first=number == 0)
+                    self._step(number)
             done += passes
             if self._sides > 1 and done < self._most and not self._is_left():
                 return
@@ -140,10 +140,11 @@ class _Peeling:
         self._frame.draw_transparent(fragment, target, defines, scissor=(first, rows), first_row=first)
         self._frame.ctx.memory_barrier()
 
-    def _step(self, is_first: bool) -> None:
+    def _step(self, number: int) -> None:
+        """Composite what a pass found. Tiles whose pixels all have fewer fragments than there were passes are done."""
         self._use_picture()
         self._frame.background.use(0)
-        self._over_tiles(f"{self._shaders}/step.frag", OCCUPIED, is_first=is_first)
+        self._over_tiles(f"{self._shaders}/step.frag", (number + 1, ANY), is_first=number == 0)
         self._frame.ctx.memory_barrier()
 
     def _use_picture(self) -> None:

@@ -217,6 +217,7 @@ def test_costs_are_reported_as_they_are(gpus: dict[str, GpuScene]) -> None:
     for name, one in rendered.items():
         assert one.captured == total, name
         assert np.array_equal(one.k, n), name
+        assert one.compared_bytes == one.total_bytes, name
     pools = {name: one.pool_bytes for name, one in rendered.items()}
     assert pools == {
         "abuffer-list": 12 * total,

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from support.scenes import SIZE, VIEW, shells
 
+from renderer.bands import row_bands
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.reference import adaptive, multilayer
 from renderer.techniques import Adaptive, Budget, Multilayer, SBuffer, Technique, bands
-from renderer.techniques.bands import Part, row_bands
+from renderer.techniques.bands import Part
 from renderer.techniques.ordered import Ordered, capture_ordered
 from renderer.techniques.runs import Runs
 from schemas.fragments import FragmentDump
@@ -145,6 +146,9 @@ def test_passes_bytes_and_skips_are_reported__technique(frame: Frame, dump: Frag
     assert list(rendered.passes) == ["opaque", "count", "prefix", "capture", "sort", "resolve"]
     assert rendered.pool_bytes == 12 * dump.total
     assert rendered.total_bytes == 12 * dump.total + 4 * frame.pixels
+    nodes = {"multilayer": 4, "adaptive": 8}[technique.name]
+    assert rendered.node_bytes == 8 * nodes
+    assert rendered.compared_bytes == 8 * nodes * frame.pixels
     assert rendered.skips["empty tiles"] > 0
 
 
