@@ -16,6 +16,7 @@ from renderer.bin_pass import Binned, gather_bins
 from renderer.gpu_scene import OPAQUE, TRANSPARENT, GpuScene, set_uniforms
 from renderer.programs import Defines
 from renderer.tile_range import STEPS, tile_grid
+from renderer.tiles import Tiles, tiles_of
 from schemas.colour import encode_gamma2
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
@@ -60,6 +61,7 @@ class Frame:
 
     Attributes:
         culled_triangles: Triangles outside the frustum, which no pass draws.
+        tiles: By their fullest pixel, once `depth_range` has counted; None before.
     """
 
     def __init__(self, gpu: GpuScene, view: View, width: int, height: int, clear: RGB = (1.0, 1.0, 1.0)) -> None:
@@ -77,6 +79,7 @@ class Frame:
         self.background = self.ctx.texture((width, height), 4)
         self.background.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self.depth = self.ctx.depth_renderbuffer((width, height))
+        self.tiles: Tiles | None = None
         self._counts: moderngl.Buffer | None = None
         self._range: tuple[moderngl.Buffer, moderngl.Buffer] | None = None
         self._tile_range: moderngl.Buffer | None = None
@@ -221,6 +224,7 @@ class Frame:
                     buffer.bind_to_storage_buffer(binding)
                 self.draw_transparent("count/count.frag", self.target([]), {"RANGE": 1})
                 self.ctx.memory_barrier()
+                self.tiles = tiles_of(self.ctx, self.gpu.programs, self._counts, self.width, self.height)
         return self._counts, *self._range
 
     def tile_range(self) -> moderngl.Buffer:

@@ -14,7 +14,7 @@ import numpy as np
 from renderer.gpu_scene import set_uniforms
 from renderer.programs import Programs
 
-BLOCK = 2048
+BLOCK = 4096
 """Words of a work group."""
 CEILING = 2**32 - 1
 """Where sums stop."""
@@ -24,21 +24,36 @@ _COUNTS, _OFFSETS, _SUMS = range(3)
 
 
 @dataclass(frozen=True, slots=True)
-class Prefix:
-    """Prefix sums on the GPU.
+class Totals:
+    """Sums of words on the GPU.
 
     Attributes:
-        offsets: uint32 [P+1]: the sum of the words before each, and of all.
         sums: uint32 [B+1, 2], of the B blocks; the last row is the sum of all words and the greatest of them.
     """
 
-    offsets: moderngl.Buffer
     sums: moderngl.Buffer
 
-    def read_totals(self) -> tuple[int, int]:
+    def read(self) -> tuple[int, int]:
         """The sum of all words and the greatest of them: 8 bytes are read back."""
         total, most = np.frombuffer(self.sums.read(8, offset=self.sums.size - 8), dtype=np.uint32)
         return int(total), int(most)
+
+
+def totals(ctx: moderngl.Context, programs: Programs, counts: moderngl.Buffer, items: int) -> Totals:
+    """The sum of some words and the greatest of them.
+
+    Args:
+        ctx: The context.
+        programs: Of the context.
+        counts: uint32 [P] or longer.
+        items: P.
+    """
+    blocks = _blocks(items)
+    sums = ctx.buffer(reserve=8 * (blocks + 1))
+    buffers = {_COUNTS: counts, _SUMS: sums}
+    _run(ctx, programs, "blocks", blocks, items, buffers)
+    _run(ctx, programs, "scan", 1, items, buffers)
+    return Totals(sums)
 
 
 def prefix_sums(
@@ -47,7 +62,7 @@ def prefix_sums(
     counts: moderngl.Buffer,
     items: int,
     into: moderngl.Buffer | None = None,
-) -> Prefix:
+) -> tuple[moderngl.Buffer, Totals]:
     """Exclusive prefix sums of some words.
 
     Args:
@@ -56,15 +71,27 @@ def prefix_sums(
         counts: uint32 [P] or longer.
         items: P.
         into: uint32 [P+1] that gets the offsets, `counts` itself if it has that many words; None: a new buffer.
+
+    Returns:
+        Offsets uint32 [P+1], the sum of the words before each and of all; and the totals.
     """
-    blocks = items // BLOCK + 1  # of P + 1 offsets
+    found = totals(ctx, programs, counts, items)
     offsets = ctx.buffer(reserve=4 * (items + 1)) if into is None else into
-    sums = ctx.buffer(reserve=8 * (blocks + 1))
-    for name, groups in (("blocks", blocks), ("scan", 1), ("offsets", blocks)):
-        for binding, buffer in ((_COUNTS, counts), (_OFFSETS, offsets), (_SUMS, sums)):
-            buffer.bind_to_storage_buffer(binding)
-        program = programs.compute(f"prefix/{name}.comp", {"BLOCK": BLOCK})
-        set_uniforms(program, {"items": items, "blocks": blocks})
-        program.run(groups)
-        ctx.memory_barrier()
-    return Prefix(offsets, sums)
+    buffers = {_COUNTS: counts, _OFFSETS: offsets, _SUMS: found.sums}
+    _run(ctx, programs, "offsets", _blocks(items), items, buffers)
+    return offsets, found
+
+
+def _blocks(items: int) -> int:
+    return items // BLOCK + 1  # of P + 1 offsets
+
+
+def _run(
+    ctx: moderngl.Context, programs: Programs, name: str, groups: int, items: int, buffers: dict[int, moderngl.Buffer]
+) -> None:
+    for binding, buffer in buffers.items():
+        buffer.bind_to_storage_buffer(binding)
+    program = programs.compute(f"prefix/{name}.comp", {"BLOCK": BLOCK})
+    set_uniforms(program, {"items": items, "blocks": _blocks(items)})
+    program.run(groups)
+    ctx.memory_barrier()

@@ -84,7 +84,8 @@ class BenchCell(CellKey):
         pool_bytes: Size of the fragment pool.
         pixel_bytes: All other buffers beside it, bytes a pixel.
         early_bytes: Most before there is a pool, bytes a pixel.
-        total_bytes: The peak of the frame: pool and what lives beside it, or what was there before.
+        total_bytes: The peak of the frame: pool and what lives beside it, or what was there before;
+            of multilayer and adaptive their nodes, which the pool emulates.
         score: (mse + LOSSLESS) / (mse of the oracle + LOSSLESS).
         score_display: The same of `mse_display`.
         over_optimum: As `score`, with the certified optimum of the cell's own tail instead of the oracle.

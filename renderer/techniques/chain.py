@@ -20,7 +20,6 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.bands import row_bands
 from renderer.bin_pass import KEPT_UNIT, Binned
 from renderer.csr import offsets_of
 from renderer.frame import Clock, Frame
@@ -278,36 +277,6 @@ def resolve_slots(
     image = resolve_screen(frame, "kbuffer/resolve.frag", textures, defines, first_row=0, **tail.bind())
     frame.ctx.memory_barrier()
     return image
-
-
-def resolve_all(frame: Frame, offsets: NDArray[np.int64], packed: NDArray[np.uint32]) -> NDArray[np.float32]:
-    """Composite a sorted pool that holds every fragment: no tail.
-
-    Args:
-        frame: The view.
-        offsets: int64 [P+1].
-        packed: uint32 [N], front to back inside a pixel.
-
-    Returns:
-        float32 [H, W, 3], linear.
-
-    Raises:
-        Problem: One pixel has more fragments than a shader can visit, or one row more than a storage buffer holds.
-    """
-    _check_turns(offsets)
-    image = frame.ctx.texture((frame.width, frame.height), 4, dtype="f4")
-    for first, rows in row_bands(offsets, frame.width, LIMITS.buffer_bytes // 4) or [(0, frame.height)]:
-        run = offsets[first * frame.width : (first + rows) * frame.width + 1]
-        offset_buffer = frame.ctx.buffer(
-            (run - run[0]).astype(np.uint32)
-        )  # named, or it would be freed before it is read
-        pool = frame.ctx.buffer(np.ascontiguousarray(packed[run[0] : run[-1]]) if run[-1] > run[0] else bytes(4))
-        offset_buffer.bind_to_storage_buffer(_OFFSETS)
-        pool.bind_to_storage_buffer(_COLOURS)
-        band = (image, first, rows)
-        defines = {"TAIL": NO_TAIL, "STRIDE": 1}
-        resolve_screen(frame, "kbuffer/resolve.frag", [frame.background], defines, band, first_row=first)
-    return read_linear(frame, image)
 
 
 def _check_turns(offsets: NDArray[np.int64]) -> None:

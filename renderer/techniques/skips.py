@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from renderer.frame import Frame
-from renderer.screen import empty_tiles
+from renderer.tiles import Tiles
 
 EMPTY_TILES = "empty tiles"
 """Tiles of the window without a transparent fragment: no pass over pixels visits them."""
@@ -19,6 +19,12 @@ HIDDEN_FRAGMENTS = "fragments behind opaque surfaces"
 """Fragments that the depth test ended before they were shaded (`renderer.hidden`; a pass of its own counts them)."""
 
 
-def frame_skips(frame: Frame) -> dict[str, int]:
-    """What every technique leaves out of a frame: empty tiles, triangles outside the frustum."""
-    return {EMPTY_TILES: empty_tiles(frame), CULLED_TRIANGLES: frame.culled_triangles}
+def frame_skips(frame: Frame, tiles: Tiles | None = None) -> dict[str, int]:
+    """What every technique leaves out of a frame: empty tiles, triangles outside the frustum.
+
+    Args:
+        frame: The view, its picture finished: what is read back here are statistics.
+        tiles: Those of the technique; None: those of the frame's count pass, if it has run.
+    """
+    found = tiles or frame.tiles
+    return {EMPTY_TILES: 0 if found is None else found.empty(), CULLED_TRIANGLES: frame.culled_triangles}

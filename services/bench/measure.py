@@ -138,7 +138,7 @@ class Bench:
             "pool_bytes": rendered.pool_bytes,
             "pixel_bytes": rendered.pixel_bytes,
             "early_bytes": rendered.early_bytes,
-            "total_bytes": rendered.total_bytes,
+            "total_bytes": rendered.compared_bytes,
             "skips": {what: int(count) for what, count in rendered.skips.items() if count},
         }
 

@@ -15,12 +15,13 @@ void main() {
         own = uvec2(add(own.x, word), max(own.y, word));
     }
     part[lane] = own;
-    for (uint half_way = 128u; half_way > 0u; half_way /= 2u) {
-        barrier();
-        if (lane < half_way) {
-            uvec2 other = part[lane + half_way];
-            part[lane] = uvec2(add(part[lane].x, other.x), max(part[lane].y, other.y));
-        }
+    barrier();
+    if (lane < 16u) {
+        for (uint i = 16u + lane; i < 256u; i += 16u) own = uvec2(add(own.x, part[i].x), max(own.y, part[i].y));
+        part[lane] = own;
     }
-    if (lane == 0u) sums[block] = part[0];
+    barrier();
+    if (lane > 0u) return;
+    for (uint i = 1u; i < 16u; ++i) own = uvec2(add(own.x, part[i].x), max(own.y, part[i].y));
+    sums[block] = own;
 }
