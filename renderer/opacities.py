@@ -1,4 +1,4 @@
-"""Opacities that vary from material to material, drawn at random: what training sees beside a scene's own."""
+"""Scenes whose materials have opacities drawn at random: what a predictor is trained on beside scenes as they are."""
 
 from __future__ import annotations
 
@@ -6,30 +6,44 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from schemas.scene import SceneArrays
+from schemas.scene import Batch, SceneArrays
 
 OPACITIES: Final = (0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
-
+"""Those that are drawn from."""
+BASE_ALPHA: Final = 0.5
+"""Opacity that such a scene is loaded with: below 1, so that every surface is drawn as a transparent one."""
 _COARSE: Final = 24
-"""Stored colours this far apart may be different materials: those without textures share a batch."""
+"""Stored colours of a batch are one material where no channel differs by more than a step of this."""
 
 
 def drawn_opacities(scene: SceneArrays, seed: int) -> SceneArrays:
-    """The scene with an opacity of its own for every material.
+    """A scene in which every material has an opacity of its own.
 
-    A material is a coarse colour of the vertices of a batch.
+    Scenes rarely say where one material ends: a material is what has one coarse vertex colour within one batch. A
+    texture's opacity is multiplied, as it is by one opacity for all; a cut-out keeps its shape.
 
     Args:
-        scene: Loaded with one opacity below 1 for all surfaces, so that every batch is drawn as transparent.
-        seed: Of the draw.
+        scene: Loaded with the opacity `BASE_ALPHA` for all surfaces. Opaque batches stay as they are.
+        seed: Of the draws: equal seeds give equal scenes.
     """
     rng = np.random.default_rng(seed)
-    stored = np.round(255.0 * np.array(OPACITIES)).astype(np.uint8)
-    key = (scene.colours[:, :3] // _COARSE).astype(np.int64) @ np.array([1, 16, 256])
     colours = scene.colours.copy()
-    for batch in scene.batches:
-        vertices = np.unique(scene.indices[batch.first : batch.first + batch.count])
-        materials, own = np.unique(key[vertices], return_inverse=True)
-        colours[vertices, 3] = stored[rng.integers(len(stored), size=len(materials))][own]
-    return replace(scene, colours=colours)
+    batches = tuple(_drawn(scene, batch, colours, rng) for batch in scene.batches)
+    return replace(scene, colours=colours, batches=batches)
+
+
+def _drawn(scene: SceneArrays, batch: Batch, colours: NDArray[np.uint8], rng: np.random.Generator) -> Batch:
+    """The batch, after its vertices in `colours` got their opacities."""
+    if batch.layer == "opaque":
+        return batch
+    if batch.opacity_threshold > 0.0:
+        # The threshold may be compared with the vertex alpha: that is its shape.
+        return replace(batch, cut_out_alpha=float(rng.choice(OPACITIES)))
+    vertices = np.unique(scene.indices[batch.first : batch.first + batch.count])
+    coarse = scene.colours[vertices, :3] // _COARSE
+    _, material = np.unique(coarse, axis=0, return_inverse=True)
+    drawn = rng.choice(OPACITIES, size=int(material.max(initial=0)) + 1)
+    colours[vertices, 3] = np.round(255.0 * drawn[material.reshape(-1)])
+    return batch
