@@ -25,7 +25,7 @@ from schemas.bundle import TailSpec
 from schemas.colour import display8
 from schemas.problem import ExitCode, Problem
 from services.local_scenes import Chosen, LocalScene, as_usd
-from services.options import check_budget, chosen_tail
+from services.options import check_budget, check_trained_tail, chosen_tail
 from services.progress import Progress
 from services.render_options import RenderOptions
 from services.stages.pictures import write_png
@@ -126,6 +126,7 @@ def render(options: RenderOptions, progress: Progress) -> Iterator[Picture]:
         needs = replace(options.needs, bundle=bundle, allocate=optimal)
         techniques = [technique(name, needs) for name in options.techniques]
         trained = next((each.manifest.tail for each in techniques if isinstance(each, KBufferDeep)), None)
+        check_trained_tail(options.tail, trained)
         tail = chosen_tail(options.tail, options.g, trained)
         written: set[Path] = set()
         for file in options.scenes:

@@ -78,7 +78,7 @@ def _bundle(folder: Path, weights: Weights, tail: TailName, driver: str) -> None
         provenance=Provenance(scenes={}, code_version="0", seed=0, machine="stress"),
         evaluation={},
     )
-    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver=driver)
+    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, torch_ubo=0.0, driver=driver)
     write_bundle(folder, weights, description, derive(pixel_sums()), lambda: parity)
 
 

@@ -20,6 +20,7 @@ from renderer.features import gather
 from schemas.problem import Problem
 from services.stress.bounds import counted
 from services.stress.cases import dump_of, some_list
+from services.stress.features import EVERY
 from services.stress.findings import Finding, NotRun, Options, Row, worst_of
 from services.stress.predictors import form, networks, real_features
 
@@ -42,7 +43,7 @@ def run(options: Options) -> Iterator[Row]:
         calls: dict[str, Callable[[], object]] = {
             "depth, error_curves": partial(error_curves, bad),
             "depth, composite": partial(composite, bad, n),
-            "depth, gather": partial(gather, bad),
+            "depth, gather": partial(gather, bad, EVERY),
             "depth, labeller.allocate": partial(labeller.allocate, arrays, [10]),
             "g, error_curves": partial(error_curves, dump, g=number),
             "g, composite": partial(composite, dump, n, g=number),
