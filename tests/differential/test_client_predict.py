@@ -51,7 +51,7 @@ def written(folder: Path, weights: Weights) -> Path:
         provenance=Provenance(scenes={}, code_version="0", seed=0, machine="test"),
         evaluation={},
     )
-    report = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver="none")
+    report = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, torch_ubo=0.0, driver="none")
     write_bundle(folder, weights, description, ROWS[N > 0], lambda: report)
     return folder
 

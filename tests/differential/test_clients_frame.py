@@ -175,7 +175,7 @@ def test_the_documents_frame_is_the_technique(
         pytest.skip("this driver has no 64-bit atomics")
     provenance = Provenance(scenes={}, code_version="0", seed=0, machine="test")
     described = Description("glass", TailSpec(name="density-16", g=0.75), "display", provenance, {})
-    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver="none")
+    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, torch_ubo=0.0, driver="none")
     network = random_weights(11, head=head, outputs=outputs)
     write_bundle(tmp_path, network, described, derive(gather(dump, bins=B)), lambda: parity)
     deep, client = KBufferDeep(tmp_path), Client(frame, (tmp_path / GLSL).read_text(), len(outputs))

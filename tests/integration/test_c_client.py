@@ -52,7 +52,7 @@ def export(folder: Path, weights: Weights, tail: TailName, features: NDArray[np.
     """A bundle whose forms nobody compared: that takes a GL context and is tested elsewhere."""
     provenance = Provenance(scenes={}, code_version="0", seed=0, machine='a "machine" \\ ö')
     described = Description("glass", TailSpec(name=tail, g=0.75), "display", provenance, {"deep": [[[1.5e-3]]]})
-    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver="none")
+    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, torch_ubo=0.0, driver="none")
     write_bundle(folder, weights, described, features, lambda: parity)
     return folder
 

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from support.dumps import random_dump
 
 from labeller.allocation import RULES, RuleName
-from labeller.curves import error_curves
+from labeller.curves import UNREACHABLE, error_curves, whole_bins
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
 from schemas.fragments import FragmentDump
-from schemas.tail import METRICS, TAILS, MetricName, TailName
+from schemas.tail import BINNED_TAILS, METRICS, TAIL_NAMES, MetricName, TailName
 
 pytestmark = pytest.mark.usefixtures("single_thread")
 
@@ -35,7 +35,7 @@ def budgets_of(dump: FragmentDump) -> list[int]:
 
 
 @settings(max_examples=60, deadline=None)
-@given(dumps, st.sampled_from(RULES), st.sampled_from(TAILS), st.sampled_from(METRICS))
+@given(dumps, st.sampled_from(RULES), st.sampled_from(TAIL_NAMES), st.sampled_from(METRICS))
 def test_every_allocation_keeps_its_limits(
     dump: FragmentDump, rule: RuleName, tail: TailName, metric: MetricName
 ) -> None:
@@ -52,7 +52,7 @@ def test_every_allocation_keeps_its_limits(
 
 
 @settings(max_examples=60, deadline=None)
-@given(dumps, st.sampled_from(TAILS))
+@given(dumps, st.sampled_from(TAIL_NAMES))
 def test_nothing_is_better_than_optimal_and_nothing_beats_its_bound(dump: FragmentDump, tail: TailName) -> None:
     curves, budgets = error_curves(dump, tail), budgets_of(dump)
     optimal = allocate_curves(dump, curves, budgets, "optimal")
@@ -65,7 +65,7 @@ def test_nothing_is_better_than_optimal_and_nothing_beats_its_bound(dump: Fragme
 
 
 @settings(max_examples=100, deadline=None)
-@given(dumps, st.sampled_from(TAILS), st.lists(st.floats(0.0, 1.1), max_size=8))
+@given(dumps, st.sampled_from(TAIL_NAMES), st.lists(st.floats(0.0, 1.1), max_size=8))
 def test_neither_the_optimums_error_nor_its_bound_rises_with_the_budget(
     dump: FragmentDump, tail: TailName, shares: list[float]
 ) -> None:
@@ -77,7 +77,25 @@ def test_neither_the_optimums_error_nor_its_bound_rises_with_the_budget(
 
 
 @settings(max_examples=60, deadline=None)
-@given(dumps, st.sampled_from(TAILS))
+@given(dumps, st.sampled_from(BINNED_TAILS), st.lists(st.floats(0.0, 1.1), max_size=8))
+def test_the_optimum_of_whole_bins_never_rises_with_the_budget_nor_beats_any_ks_bound(
+    dump: FragmentDump, tail: TailName, shares: list[float]
+) -> None:
+    budgets = sorted({*budgets_of(dump), *(int(share * dump.total) for share in shares)})
+    curves = error_curves(dump, tail)
+    cuts = whole_bins(dump, curves)
+    found, free = (allocate_curves(dump, each, budgets, "optimal") for each in (cuts, curves))
+    for values in ([x.error for x in found], [x.bound for x in found]):
+        here = np.array(values)
+        assert (here[1:] <= here[:-1] * (1 + 1e-12)).all()
+    for of_cuts, of_any in zip(found, free, strict=True):
+        assert of_cuts.used <= of_cuts.budget
+        assert (cuts.at(of_cuts.k) < UNREACHABLE).all()
+        assert of_any.bound <= of_cuts.error * (1 + 1e-12)
+
+
+@settings(max_examples=60, deadline=None)
+@given(dumps, st.sampled_from(TAIL_NAMES))
 def test_hulls_are_convex_and_below_their_curves(dump: FragmentDump, tail: TailName) -> None:
     curves = error_curves(dump, tail)
     hulls = lower_hulls(curves)

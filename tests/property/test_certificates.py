@@ -17,9 +17,10 @@ from labeller.curves import Curves, error_curves, error_curves_by_g
 from labeller.error_rules import ErrorRule
 from labeller.rules import allocate_curves
 from labeller.streaming import allocate_bands
+from renderer.tile_range import tile_grid, tile_ranges
 from schemas.fragments import FragmentDump
 from schemas.problem import Problem
-from schemas.tail import METRICS, MetricName
+from schemas.tail import METRICS, RANGE_TILE, MetricName
 
 pytestmark = pytest.mark.usefixtures("single_thread")
 
@@ -174,7 +175,7 @@ def test_a_picture_of_equal_lists_is_proven() -> None:
 dumps = st.builds(
     random_dump,
     width=st.integers(1, 6),
-    height=st.integers(1, 12),
+    height=st.integers(1, 40),
     max_n=st.sampled_from([0, 1, 3, 12]),
     seed=st.integers(0, 2**16),
     alpha=st.sampled_from([None, 1 / 255, 0.5]),
@@ -182,8 +183,8 @@ dumps = st.builds(
 
 
 def bands_of(dump: FragmentDump, rows: int) -> list[FragmentDump]:
-    """A view's row bands of some rows each."""
-    made = []
+    """A view's row bands of some rows each, whole tiles, with their tiles' ranges."""
+    made, columns, ranges = [], tile_grid(dump.width, dump.height)[0], tile_ranges(dump)
     for y in range(0, dump.height, rows):
         p, q = y * dump.width, min(y + rows, dump.height) * dump.width
         i, j = dump.offsets[p], dump.offsets[q]
@@ -191,13 +192,14 @@ def bands_of(dump: FragmentDump, rows: int) -> list[FragmentDump]:
             FragmentDump(
                 *(dump.width, (q - p) // dump.width, dump.offsets[p : q + 1] - i),
                 *(dump.rgba[i:j], dump.depth[i:j], dump.background[p:q], dump.facing[p:q]),
+                tile_range=ranges[y // RANGE_TILE * columns : -(-(y + rows) // RANGE_TILE) * columns],
             )
         )
     return made
 
 
 @settings(max_examples=80, deadline=None)
-@given(dumps, st.integers(1, 5), st.sampled_from(["optimal", "greedy", "increment"]))
+@given(dumps, st.sampled_from([8, 16, 24]), st.sampled_from(["optimal", "greedy", "increment"]))
 def test_row_bands_give_what_the_whole_view_gives(dump: FragmentDump, rows: int, rule: ErrorRule) -> None:
     occupied, total = int(np.count_nonzero(dump.counts)), dump.total
     budgets = [max(0, F) for F in (0, occupied - 1, occupied, total // 2, total // 2, total - 1, total + 3)]
@@ -213,7 +215,7 @@ def test_row_bands_give_what_the_whole_view_gives(dump: FragmentDump, rows: int,
 def test_row_bands_refuse_what_they_cannot_do() -> None:
     for budgets, rule in (([5], "fixed"), ([2.5], "optimal"), ([-1], "greedy")):
         with pytest.raises(Problem):
-            allocate_bands(lambda: bands_of(random_dump(4, 4, 3, seed=0), 2), budgets, rule)  # type: ignore[arg-type]
+            allocate_bands(lambda: bands_of(random_dump(4, 4, 3, seed=0), 8), budgets, rule)  # type: ignore[arg-type]
 
 
 @settings(max_examples=60, deadline=None)

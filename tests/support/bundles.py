@@ -49,7 +49,9 @@ def make_bundle(
         self_test=SelfTest(
             features=(), outputs=(), sums=(), derived=(), tolerance={}, feature_tolerance=1e-4, output_scale=(1.0, 1.0)
         ),
-        parity=ParityReport(count=10, tolerance=TOLERANCE, torch_onnx=1e-7, torch_glsl=parity, driver="llvmpipe"),
+        parity=ParityReport(
+            count=10, tolerance=TOLERANCE, torch_onnx=1e-7, torch_glsl=parity, torch_ubo=0.0, driver="llvmpipe"
+        ),
         provenance=Provenance(scenes=scenes or {"bottles": "0" * 64}, code_version="v1", seed=0, machine="a machine"),
         evaluation={"views": 2},
     )

@@ -24,7 +24,11 @@ void main() {
 #elif OUTPUTS == 1
     answer[i - first] = diaphane_predict(x);
 #else
-    vec2 y = diaphane_predict(x).xy;
-    for (int j = 0; j < 2; ++j) answer[(i - first) * 2 + j] = y[j];
+#if OUTPUTS == 2
+    vec2 y = diaphane_predict(x);
+#else
+    vec3 y = diaphane_predict(x);
+#endif
+    for (int j = 0; j < OUTPUTS; ++j) answer[(i - first) * OUTPUTS + j] = y[j];
 #endif
 }
