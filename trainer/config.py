@@ -24,8 +24,8 @@ SIZES: Final[dict[NetworkSize, dict[str, Any]]] = {
     "small": {},
     "full": {"hidden": (64, 32), "steps": 4000},
 }
-"""Settings of each size that differ from the defaults (benchmarks/PREDICTORS.md). `tiny` reads the depth bins
-and what a frame has anyway, so that no colours are gathered."""
+"""Settings of each size that differ from the defaults; `benchmarks.predictors` measures them. `tiny` reads the depth
+bins and what a frame has anyway, so that no colours are gathered."""
 
 
 class TrainConfig(BaseModel):
