@@ -153,7 +153,20 @@ def check_steepness(g: float | None, *, has_bundle: bool, is_tail_named: bool, o
         )
 
 
-def chosen_tail(tail: TailName | None, g: float | None, trained: TailSpec | None) -> TailSpec:
+@dataclass(frozen=True, slots=True)
+class ChosenTail:
+    """A tail to render with; unlike a bundle's, it may be any.
+
+    Attributes:
+        name: Of the tail.
+        g: The density tail's constant.
+    """
+
+    name: TailName
+    g: float
+
+
+def chosen_tail(tail: TailName | None, g: float | None, trained: TailSpec | None) -> ChosenTail:
     """What is rendered: a tail that is asked for, else the one that a network was trained with, else the usual one.
 
     Args:
@@ -163,7 +176,7 @@ def chosen_tail(tail: TailName | None, g: float | None, trained: TailSpec | None
     """
     name = tail or (DEFAULT_TAIL if trained is None else trained.name)
     usual = trained.g if trained is not None and trained.name == name else DENSITY_G
-    return TailSpec(name=name, g=usual if g is None else g)
+    return ChosenTail(name, usual if g is None else g)
 
 
 def check_bundle_tail(tail: TailName) -> None:

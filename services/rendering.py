@@ -21,11 +21,10 @@ from renderer.scene import NothingToDraw
 from renderer.techniques import TECHNIQUES, Budget, KBufferDeep, Rendered, SBuffer, Technique, technique
 from renderer.techniques.skips import HIDDEN_FRAGMENTS
 from renderer.timecodes import numbered
-from schemas.bundle import TailSpec
 from schemas.colour import display8
 from schemas.problem import ExitCode, Problem
 from services.local_scenes import Chosen, LocalScene, as_usd
-from services.options import check_budget, check_trained_tail, chosen_tail
+from services.options import ChosenTail, check_budget, check_trained_tail, chosen_tail
 from services.progress import Progress
 from services.render_options import RenderOptions
 from services.stages.pictures import write_png
@@ -113,7 +112,7 @@ class _Job:
     chosen: Chosen
     frame: float | None
     size: tuple[int, int]
-    tail: TailSpec
+    tail: ChosenTail
 
 
 def render(options: RenderOptions, progress: Progress) -> Iterator[Picture]:
@@ -138,7 +137,7 @@ def render(options: RenderOptions, progress: Progress) -> Iterator[Picture]:
 def _scene(
     scene: LocalScene,
     techniques: list[Technique],
-    tail: TailSpec,
+    tail: ChosenTail,
     options: RenderOptions,
     progress: Progress,
     written: set[Path],

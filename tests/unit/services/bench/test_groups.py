@@ -88,7 +88,7 @@ def test_points_tell_techniques_and_their_tails_apart() -> None:
             look = (datum[points["color"]["field"]], datum[points["shape"]["field"]])
             looks.setdefault(look, set()).add(datum["technique"])
         assert all(len(shown) == 1 for shown in looks.values())
-        assert {"kbuffer", "kbuffer (density-16 g = 0.5)", "kbuffer (exact-coverage)"} < set().union(*looks.values())
+        assert {"kbuffer", "kbuffer (binned-12 g = 0.5)", "kbuffer (exact-coverage)"} < set().union(*looks.values())
         assert len({colour for colour, _ in looks if colour.startswith("kbuffer")}) == 2, "one for all of its tails"
 
 
@@ -124,7 +124,7 @@ def test_what_is_written_under_bars_does_not_overlap() -> None:
 
 
 def test_every_bar_of_a_cluster_looks_different() -> None:
-    tails = ("density-16", "density-8", "density", "exact-coverage", "weighted-average")
+    tails = ("density-16", "binned-8", "density", "exact-coverage", "weighted-average")
     cells = [cell(name, tail=tail) for name in ("kbuffer", "kbuffer-optimal") for tail in tails]
     svg = ElementTree.fromstring(error_bars(groups_of([view(*cells)]), 2.0))
     bars = [bar for bar in svg.iter("{http://www.w3.org/2000/svg}rect") if len(bar)]
