@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from schemas.fragments import FragmentDump
@@ -65,20 +64,9 @@ def tile_ranges(dump: FragmentDump) -> NDArray[np.float32]:
             )
         return found
     ranges = np.zeros((rows * columns, 2), dtype=np.float32)
-    _fragment_ranges(dump.offsets, dump.depth, dump.width, columns, ranges)
+    occupied = np.flatnonzero(dump.counts)
+    tile = occupied // dump.width // RANGE_TILE * columns + occupied % dump.width // RANGE_TILE
+    ranges[tile, 0] = np.inf
+    np.minimum.at(ranges[:, 0], tile, dump.depth[dump.offsets[occupied]])
+    np.maximum.at(ranges[:, 1], tile, dump.depth[dump.offsets[occupied + 1] - 1])
     return ranges
-
-
-@njit(cache=True)
-def _fragment_ranges(
-    offsets: NDArray[np.int64], depth: NDArray[np.float32], width: int, columns: int, out: NDArray[np.float32]
-) -> None:
-    """Nearest and farthest fragment of every tile; 0, 0 where there is none."""
-    for p in range(len(offsets) - 1):
-        first, last = offsets[p], offsets[p + 1] - 1
-        if last < first:
-            continue
-        tile = p // width // RANGE_TILE * columns + p % width // RANGE_TILE
-        if out[tile, 1] == 0.0 or depth[first] < out[tile, 0]:
-            out[tile, 0] = depth[first]
-        out[tile, 1] = max(out[tile, 1], depth[last])
