@@ -29,10 +29,11 @@ python -m benchmarks.predictors{options} --work FOLDER \\
     --out benchmarks/results/{name}.json --page benchmarks/{page}.md
 ```
 
-**Score.** `q = (MSE + 1e-7) / (MSE of the oracle + 1e-7)` of a view at F = W H x {multiples}, where F < {share:g} N.
-The oracle is DHOIT's own optimal k-buffer: Algorithm 1, offline, with its tail and its k_min = 1. Tables give geometric
-means over views; *score* is that of a row's columns. Below 1 is better than the oracle. Errors are what a frame does
-with a network's curves: whole bins within the budget, the other fragments by the tail, every pixel, in display space.
+**Score.** `q = (MSE + 1e-7) / (MSE of the oracle + 1e-7)` of a view at F = W H x {multiples},
+where F < {share:g} N. The oracle is DHOIT's own optimal k-buffer: Algorithm 1, offline, with its tail and its
+k_min = 1. Tables give geometric means over views; *score* is that of a row's columns. Below 1 is better than the
+oracle. Errors are of what a frame does with a network's curves: whole bins within the budget, the other fragments by
+the tail, every pixel, in display space.
 
 **Unseen.** Every asset is held out once: networks are trained on the assets of the other folds and scored on it.
 Held-out assets have no say in a training, not even in when it ends. Trained on are also views whose materials have
