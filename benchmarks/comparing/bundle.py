@@ -20,6 +20,7 @@ from benchmarks.predicting.views import ViewRow, views_of
 from labeller.shards import read_shard
 from renderer.context import gl_context
 from renderer.samples import SAMPLES
+from renderer.samples.deep import DEEP
 from schemas.bundle import Provenance, TailSpec
 from schemas.network import DEFAULT_NETWORK, SIZES, NetworkSize
 from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAILS, TailName
@@ -39,7 +40,7 @@ def main() -> int:
     """Trains and exports."""
     given = _parse()
     store = Store(given.work)
-    rows = [row for row in views_of(store, given.scenes, SIZE, VIEWS) if row.asset not in {*SHARED, *SAMPLES}]
+    rows = [row for row in views_of(store, given.scenes, SIZE, VIEWS) if row.asset not in {*SHARED, *SAMPLES, *DEEP}]
     if not rows:
         print("There is no scene to train on beside those of the suite.", file=sys.stderr)
         return 1
