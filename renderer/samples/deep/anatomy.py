@@ -100,7 +100,7 @@ def _smooth(points: list[tuple[float, float, float]], steps: int = 30) -> Floats
     """A smooth path [steps, 3] near some points."""
     p = np.array(points)
     path = np.column_stack([np.interp(np.linspace(0, len(p) - 1, steps), np.arange(len(p)), p[:, i]) for i in range(3)])
-    for _ in range(3):
+    for _ in range(12):
         path[1:-1] = 0.25 * path[:-2] + 0.5 * path[1:-1] + 0.25 * path[2:]
     return path
 
@@ -185,7 +185,8 @@ def _skeleton(author: StageAuthor, looks: Looks) -> None:
     )
     for side in (-1.0, 1.0):
         half = sphere(1.0, 40, 60)
-        fold = 1.0 + 0.045 * np.sin(22.0 * half.points[:, 1] + 5.0 * np.sin(9.0 * half.points[:, 2]))
+        up, ahead = half.points[:, 1], half.points[:, 2]
+        fold = 1.0 + 0.035 * (1.0 - up**2) * np.sin(16.0 * up + 4.0 * np.sin(7.0 * ahead))
         lobe = Polygons(half.points * fold[:, None], half.faces).moved(
             scale=(0.027, 0.058, 0.072), by=(0.029 * side, 1.695, 0.0)
         )
@@ -247,10 +248,6 @@ def _belly(author: StageAuthor, looks: Looks) -> None:
         [(0.015, 1.17, 0.0), (0.05, 1.14, 0.03), (0.075, 1.09, 0.045), (0.05, 1.05, 0.06), (0.0, 1.05, 0.06)]
     )
     girth = np.interp(np.linspace(0, 1, len(stomach)), (0, 0.25, 0.6, 1), (0.010, 0.036, 0.034, 0.012))
-    t = np.linspace(0.0, 1.0, 420)
-    x = 0.075 * np.sin(2.0 * np.pi * 9.5 * t) * (1.0 - 0.3 * t)
-    y = 1.015 - 0.15 * t + 0.012 * np.cos(2.0 * np.pi * 19.0 * t)
-    small = np.column_stack((x, y, 0.045 + 0.030 * np.sin(2.0 * np.pi * 4.3 * t)))
     large = _smooth(
         [
             (-0.10, 0.88, 0.03),
@@ -268,13 +265,25 @@ def _belly(author: StageAuthor, looks: Looks) -> None:
     bulge = 0.019 * (1.0 + 0.16 * np.sin(np.arange(150) * 1.1))
     for layer, share in enumerate((1.0, 0.8)):
         author.mesh(f"Belly/Stomach{layer}", tube(stomach, share * girth, 20), looks["Stomach"])
-        author.mesh(f"Belly/Small{layer}", tube(small, 0.0125 * share, 12), looks["Bowel"])
+        author.mesh(f"Belly/Small{layer}", joined([_loop(i, 0.0125 * share) for i in range(22)]), looks["Bowel"])
         author.mesh(f"Belly/Large{layer}", tube(large, share * bulge, 14), looks["Bowel"])
     for side in (-1.0, 1.0):
         for layer, share in enumerate((1.0, 0.6)):
             kidney = _ball((0.026 * share, 0.048 * share, 0.022 * share), (0.065 * side, 1.06, -0.045), 12)
             author.mesh(f"Belly/Kidney{side > 0:d}{layer}", kidney, looks["Kidney"])
     author.mesh("Belly/Bladder", _ball((0.034, 0.028, 0.03), (0.0, 0.80, 0.045), 12), looks["Airway"])
+
+
+def _loop(number: int, radius: float) -> Polygons:
+    """A loop of the small bowel, one of rows that overlap."""
+    angle = 2.0 * np.pi * np.arange(40) / 40
+    turn, tilt = 0.9 * number, 0.5 * np.sin(2.3 * number)
+    wide, high = 0.026 * np.cos(angle), 0.019 * np.sin(angle)
+    x = wide * np.cos(turn) - high * np.sin(turn)
+    y = wide * np.sin(turn) + high * np.cos(turn)
+    row, column = divmod(number, 4)
+    centre = np.array([-0.06 + 0.04 * column, 0.99 - 0.026 * row, 0.045 + 0.018 * np.cos(1.7 * number)])
+    return tube(np.column_stack((x, y, tilt * x)) + centre, radius, 12, closed=True)
 
 
 def _vessels(author: StageAuthor, looks: Looks, rng: np.random.Generator) -> None:

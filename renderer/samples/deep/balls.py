@@ -12,7 +12,7 @@ from renderer.samples.shapes import Floats, Polygons, disc, lathe, rounded, sphe
 
 
 def marbles(folder: Path) -> Path:
-    """A glass bowl with 2,000 instanced marbles, each of clear glass round a coloured heart."""
+    """A glass bowl with 1,000 instanced marbles, each of clear glass round a coloured heart."""
     author = StageAuthor(folder / "marbles.usdc", metres=0.01)
     rng = np.random.default_rng(47)
     author.sky(200.0, (0.10, 0.09, 0.12))

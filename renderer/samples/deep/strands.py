@@ -29,7 +29,7 @@ _BODY: tuple[tuple[tuple[float, float, float], tuple[float, float, float], int, 
 
 
 def fur(folder: Path) -> Path:
-    """A sitting bear cub whose fur is 49,000 translucent curves that thin out towards their tips."""
+    """A sitting bear cub whose fur is 48,000 translucent curves that thin out towards their tips."""
     author = StageAuthor(folder / "fur.usdc")
     rng = np.random.default_rng(41)
     author.mesh("Ground", disc(1.1, 0.05), author.material("Ground", (0.36, 0.42, 0.30)))

@@ -1,4 +1,4 @@
-"""Deep sample scene of a CAD assembly in x-ray: a jet engine of 3,000 nested parts at low opacity."""
+"""Deep sample scene of a CAD assembly in x-ray: a jet engine of 2,600 nested parts at low opacity."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _LOOKS = {
 
 
 def turbofan(folder: Path) -> Path:
-    """A turbofan in x-ray: casings, 35 rows of instanced blades on their disks, shafts, combustor, pipes and bolts."""
+    """A turbofan in x-ray: casings, 38 rows of instanced blades on their disks, shafts, combustor, pipes and bolts."""
     author = StageAuthor(folder / "turbofan.usdc")
     looks = {name: author.material(name, colour, opacity) for name, (colour, opacity) in _LOOKS.items()}
     author.sky(30.0, (0.05, 0.09, 0.16), horizon=-1.9)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from renderer.scene import load_scene
 from schemas.scene import SceneArrays
 
 DEPTHS = {
-    "anatomy": 8.8,
+    "anatomy": 8.7,
     "fur": 8.6,
     "fountain": 10.6,
     "turbofan": 12.4,
@@ -31,6 +32,7 @@ DEPTHS = {
 }
 """Transparent fragments a pixel of the first camera at 1430x960."""
 SIZE = (143, 96)
+DOCUMENT = Path(__file__).resolve().parents[3] / "docs" / "SAMPLES.md"
 
 
 @pytest.fixture(scope="module")
@@ -90,6 +92,12 @@ def test_they_spread_from_8_to_100_fragments_a_pixel() -> None:
     assert depths[0] >= 8.0
     assert 80.0 < depths[-1] <= 100.0
     assert max(b / a for a, b in pairwise(depths)) < 2.0
+
+
+def test_the_document_lists_every_scene_and_how_deep_it_is() -> None:
+    rows = re.findall(r"^\| `(\w+)` \| ([\d.]+) \|", DOCUMENT.read_text(encoding="utf-8"), re.MULTILINE)
+    assert {name: float(depth) for name, depth in rows} == DEPTHS
+    assert all(f"| `{name}` |" in DOCUMENT.read_text(encoding="utf-8") for name in SAMPLES)
 
 
 def test_they_are_of_cards_curves_points_shells_and_instances(folder: Path, scenes: dict[str, SceneArrays]) -> None:
