@@ -12,14 +12,11 @@ from numpy.typing import NDArray
 
 from renderer.techniques.abuffer_list import NODE_BYTES
 from renderer.techniques.chain import SLOT_BYTES
-from renderer.techniques.peeling import LIGHT_BYTES, SIDE
+from renderer.techniques.peeling import BACK_BYTES, SIDE_BYTES
 from schemas.limits import LIMITS
 
-_COUNT_BYTES = 12
-"""Bytes a pixel of the count pass: n, z_min, z_max."""
 _WORD_BYTES = 4
-"""Bytes a pixel of an offset, a cursor, a head, or a place in a list of pixels."""
-_SIDE_BYTES = SIDE.itemsize + LIGHT_BYTES
+"""Bytes a pixel of a count that becomes an offset or a cursor, or of a head of a list."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,11 +48,11 @@ def exact_bytes(name: str, n: NDArray[np.integer]) -> ExactBytes | None:
     """
     total, most, pixels = int(n.sum(dtype=np.int64)), int(n.max(initial=0)), len(n)
     pools = {
-        "sbuffer": (SLOT_BYTES * total, _COUNT_BYTES + _WORD_BYTES),
-        "abuffer-list": (NODE_BYTES * total, _COUNT_BYTES + 2 * _WORD_BYTES),
-        "abuffer-array": (SLOT_BYTES * most * pixels, _COUNT_BYTES + 2 * _WORD_BYTES),
-        "depth-peeling": (0, _COUNT_BYTES + _SIDE_BYTES + _WORD_BYTES),
-        "dual-depth-peeling": (0, _COUNT_BYTES + 2 * _SIDE_BYTES + _WORD_BYTES),
+        "sbuffer": (SLOT_BYTES * total, _WORD_BYTES),
+        "abuffer-list": (NODE_BYTES * total, 2 * _WORD_BYTES),
+        "abuffer-array": (SLOT_BYTES * most * pixels, _WORD_BYTES),
+        "depth-peeling": (0, SIDE_BYTES),
+        "dual-depth-peeling": (0, 2 * SIDE_BYTES + BACK_BYTES),
     }
     found = pools.get(name)
     return None if found is None else ExactBytes(*found, pixels)

@@ -1,7 +1,7 @@
 """The manifest of a bundle: what its predictor reads, which tail it was trained for, and what was proven of it.
 
 A bundle is a folder with `manifest.json` and the files that it lists by hash. The predictor gives `a` and `b` per
-pixel; the renderer keeps `k = clamp(floor(1.5 + (a - log lambda) / b), k_min, n)` fragments (METHOD.md section 4).
+pixel; the renderer keeps `k = clamp(floor(1.5 + (a - log lambda) / b), 0, n)` fragments (METHOD.md section 4).
 """
 
 from __future__ import annotations
@@ -239,7 +239,6 @@ class Manifest(BaseModel):
         layers: Tensors of `weights.safetensors`.
         tail: Tail of the allocation.
         metric: Where the error was measured.
-        k_min: Fewest core fragments of an occupied pixel where the budget covers that, else 0.
         files: File name -> size and hash.
         onnx: What `model.onnx` needs; None in the first format.
         self_test: Rows to check a compiled form with; None in the first format.
@@ -259,7 +258,6 @@ class Manifest(BaseModel):
     layers: tuple[LayerSpec, ...]
     tail: TailSpec
     metric: MetricName
-    k_min: int = Field(ge=0, le=1)
     files: dict[str, FileSpec]
     onnx: OnnxSpec | None = None
     self_test: SelfTest | None = None

@@ -63,8 +63,8 @@ def taught_gains(
         inputs: float32 [B, F], what the teacher reads of them.
 
     Returns:
-        k float32 [B], `clamp(1 + (a - log lambda) / b, k_min, n)`, and `a - b (k - 1)`, float32 [B].
+        k float32 [B], `clamp(1 + (a - log lambda) / b, 0, n)`, and `a - b (k - 1)`, float32 [B].
     """
     a, b = np.ascontiguousarray(teacher.answer(inputs).T)
-    k = np.clip(np.float32(1.0) + (a - batch.log_lambda) / b, batch.k_min, batch.n)
+    k = np.clip(np.float32(1.0) + (a - batch.log_lambda) / b, 0, batch.n)
     return k, a - b * (k - np.float32(1.0))

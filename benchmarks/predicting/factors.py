@@ -43,9 +43,6 @@ FACTORS: Final = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5)
 ANSWER_BYTES: Final = 4
 """Of a pixel, while sums are gathered and while fragments are captured: what the third output takes."""
 
-_LABELLED: Final = 1
-"""k_min of the curves."""
-
 Errors = NDArray[np.float32]
 
 
@@ -107,10 +104,10 @@ def factor_labels(store: Store, row: ViewRow, tail: TailName) -> FactorLabels:
         dump = load_dump(store, row)
         by_factor = _curves(dump, tail)
         envelope = replace(by_factor[0], error=np.minimum.reduce([curves.error for curves in by_factor]))
-        least = lower_hulls(envelope, _LABELLED)
+        least = lower_hulls(envelope)
         write_shard(shard, dump, envelope, least, row.budgets)
         pixel = read_shard(shard).pixel
-        made = [_rows_of(lower_hulls(curves, _LABELLED), pixel) for curves in by_factor]
+        made = [_rows_of(lower_hulls(curves), pixel) for curves in by_factor]
         parts = ("offsets", "slopes", "lengths")
         named: dict[str, Any] = {
             f"{part}{j}": array for j, arrays in enumerate(made) for part, array in zip(parts, arrays, strict=True)
@@ -186,13 +183,13 @@ class FactorHead(GainCurveHead):
         drawn = (config.seed, step), config.batch, drawing
         batch = sample_batch(seen, [FEATURES.index(name) for name in network.features], *drawn)
         a, b, factor = network(torch.from_numpy(batch.features)).unbind(dim=1)
-        n, k_min, price = map(torch.from_numpy, (batch.n, batch.k_min, batch.log_lambda))
+        n, price = map(torch.from_numpy, (batch.n, batch.log_lambda))
         costs, least, leaks = [], [], []
         for j in range(len(FACTORS)):
             # The same draw: rows and prices are those of the batch.
             other = sample_batch([view.by_factor[j] for view in seen], [], *drawn)
             slopes, lengths = torch.from_numpy(other.slopes), torch.from_numpy(other.lengths)
-            regret, overshoot = lagrangian_regret(a, b, n, k_min, slopes, lengths, price)
+            regret, overshoot = lagrangian_regret(a, b, n, slopes, lengths, price)
             least.append(least_cost(slopes, lengths, price))
             costs.append(torch.relu(regret) + least[-1])
             leaks.append(overshoot)
@@ -206,7 +203,7 @@ class FactorHead(GainCurveHead):
 
 
 def least_cost(slopes: Tensor, lengths: Tensor, log_lambda: Tensor) -> Tensor:
-    """`min_j (E(j) + lambda (j - k_min)) / lambda` of hulls, float32 [R], in fragments.
+    """`min_j (E(j) + lambda j) / lambda` of hulls, float32 [R], in fragments.
 
     Args:
         slopes: float32 [R, H], error gained per fragment; 0 where a hull has ended.

@@ -31,9 +31,6 @@ OFFLINE: Final[tuple[RuleName, ...]] = ("optimal", "greedy")
 RUN_TIME: Final[tuple[RuleName, ...]] = ("proportional", "importance", "dynamic", "fixed")
 """Rules that a frame can follow."""
 
-_LABELLED: Final = 1
-"""k_min of the curves."""
-
 
 @dataclass(frozen=True, slots=True)
 class Labelled:
@@ -111,7 +108,7 @@ def _label(
     if remap is not None:
         dump = remapped(dump, remap)
     curves = error_curves(dump, tail)
-    hulls = lower_hulls(curves, _LABELLED)
+    hulls = lower_hulls(curves)
     write_shard(shard, dump, curves, hulls, row.budgets)
     if remap is not None:
         return {"mse": {}}

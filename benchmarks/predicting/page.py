@@ -31,10 +31,10 @@ python -m benchmarks.predictors --scenes ../shared/scenes --work FOLDER{options}
     --out benchmarks/results/{name}.json --page benchmarks/{page}.md
 ```
 
-**Score.** `q = (MSE + 1e-7) / (MSE of the oracle + 1e-7)` of a view at F = W H x 1, 2, 4 where F < N, k_min 1. The
-oracle is DHOIT's own optimal k-buffer: Algorithm 1, offline, with its tail. Tables give geometric means over views;
-*score* is that of the three columns. Below 1 is better than the oracle. Errors are of the stored fragments composited
-with the tail, every pixel of the view, in display space.
+**Score.** `q = (MSE + 1e-7) / (MSE of the oracle + 1e-7)` of a view at F = W H x 1, 2, 4 where F < N. The oracle is
+DHOIT's own optimal k-buffer: Algorithm 1, offline, with its tail and its k_min = 1. Tables give geometric means over
+views; *score* is that of the three columns. Below 1 is better than the oracle. Errors are of the stored fragments
+composited with the tail, every pixel of the view, in display space.
 
 **Unseen.** Every asset is held out once: networks are trained on the assets of the other folds and scored on it.
 Held-out assets have no say in a training, not even in when it ends.

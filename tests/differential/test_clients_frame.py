@@ -45,7 +45,7 @@ class Client:
         self.width, self.height, self.pixels = frame.width, frame.height, frame.pixels
         self.texts, self.outputs = {"bundle/predict.glsl": predict}, outputs
         self.groups = self.pixels // 2048 + 1
-        self.state = self.words(312 // 4, 0)  # once
+        self.state = self.words(304 // 4, 0)  # once
 
     def words(self, count: int, fill: int) -> moderngl.Buffer:
         return self.ctx.buffer(np.full(max(count, 1), fill, np.uint32))
@@ -77,7 +77,7 @@ class Client:
         for uniform, value in uniforms.items():
             program[uniform] = value
         if groups is None:
-            program.run_indirect(self.state, 44)
+            program.run_indirect(self.state, 36)
         else:
             program.run(min(groups, 1024), -(-groups // 1024))
         self.ctx.memory_barrier()
@@ -108,7 +108,7 @@ class Client:
         listed = self.words(self.pixels + 1, 7)
         allocation = {0: self.state, 1: count, 2: listed, 3: curves, 4: blocks}
         self.run("allocation/totals.comp", LATTICE, allocation, self.groups, pixels=self.pixels)
-        self.run("allocation/begin.comp", LATTICE, allocation, 1, blocks=self.groups, budget=budget)
+        self.run("allocation/begin.comp", LATTICE, allocation, 1, blocks=self.groups, fragments=budget)
         for unit, texture in enumerate([*sums, self.frame.background]):
             texture.use(unit)
         buffers = {0: self.state, 1: z_min, 2: z_max, 3: nearest, 5: curves, 6: count, 7: depth_bins}
@@ -174,7 +174,7 @@ def test_the_documents_frame_is_the_technique(
     if one_pass and not one_pass_available(ctx):
         pytest.skip("this driver has no 64-bit atomics")
     provenance = Provenance(scenes={}, code_version="0", seed=0, machine="test")
-    described = Description("glass", TailSpec(name="density-16", g=0.75), "display", 1, provenance, {})
+    described = Description("glass", TailSpec(name="density-16", g=0.75), "display", provenance, {})
     parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver="none")
     network = random_weights(11, head=head, outputs=outputs)
     write_bundle(tmp_path, network, described, derive(gather(dump, bins=B)), lambda: parity)

@@ -11,12 +11,13 @@ from support.scenes import SIZE, VIEW, shells
 from support.training import export_random, random_weights
 
 from labeller.curves import composite
-from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
+from renderer.allocation.fill import budget_fill, solve_lambda
+from renderer.allocation.lattice import curves_of, price, solve_on_lattice
 from renderer.features import FEATURES, derive, gather, texels_of
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.techniques import Budget, KBufferDeep
-from renderer.techniques.skips import PREDICTOR, SETTLED_PIXELS, TAIL, UNREAD_SUMS
+from renderer.techniques.skips import PREDICTOR, TAIL, UNREAD_SUMS
 from schemas.bundle import HeadName, OutputName
 from schemas.colour import display8
 from schemas.fragments import FragmentDump
@@ -61,7 +62,7 @@ def test_budget_is_met_exactly_and_the_picture_is_as_simulated(
     rendered = deep.render(frame, budget)
     assert rendered.captured == budget.fragments
     assert (rendered.k <= dump.counts).all()
-    assert (rendered.k >= np.minimum(dump.counts, feasible_k_min(dump.counts, budget.fragments))).all()
+    assert (rendered.k >= 0).all()
     simulated = composite(dump, rendered.k, "density", 0.75).reshape(*rendered.linear.shape)
     assert np.abs(display8(rendered.linear).astype(int) - display8(simulated).astype(int)).max() <= 1
 
@@ -69,12 +70,10 @@ def test_budget_is_met_exactly_and_the_picture_is_as_simulated(
 def test_counts_are_those_of_the_cpu(deep: KBufferDeep, network: Weights, frame: Frame, dump: FragmentDump) -> None:
     budget = dump.total // 3
     n = dump.counts
-    k_min = feasible_k_min(n, budget)
-    expected = np.minimum(n, k_min).astype(np.int32)
-    rows = np.flatnonzero(n > k_min)
+    expected = np.zeros(len(n), dtype=np.int32)
+    rows = np.flatnonzero(n)
     a, b = network.predict(derive(gather(dump))[rows])
-    left = budget - int(expected.sum()) + k_min * len(rows)
-    expected[rows] = solve_lambda(a, b, n[rows], left, k_min)[0]
+    expected[rows] = solve_lambda(a, b, n[rows], budget)[0]
     difference = np.abs(deep.render(frame, Budget(budget)).k - expected)
     assert (difference == 0).mean() > 0.99
     assert difference.max() <= 1
@@ -127,27 +126,22 @@ def test_another_budget_of_a_frame_needs_no_inference(bundle: Path, fresh: Frame
     assert np.array_equal(again.linear, other.linear)
 
 
-def test_pixels_of_one_fragment_get_curves_when_the_budget_no_longer_covers_them(
-    bundle: Path, gl: moderngl.Context
+def test_both_solvers_give_the_same_counts_but_for_what_grows_between_two_prices(
+    bundle: Path, fresh: Frame, dump: FragmentDump
 ) -> None:
-    frame = Frame(GpuScene(gl, shells(layers=1, duplicates=1)), VIEW, *SIZE)
-    n = frame.count()
-    occupied = int(np.count_nonzero(n))
-    assert (n == 1).any()
-    deep = KBufferDeep(bundle)
-    deep.render(frame, Budget(occupied))
-    again = deep.render(frame, Budget(occupied - 1))
-    alone = KBufferDeep(bundle).render(frame, Budget(occupied - 1))
-    assert again.skips[SETTLED_PIXELS] == 0
-    assert np.array_equal(again.k, alone.k)
-
-
-def test_both_solvers_give_the_same_counts(bundle: Path, fresh: Frame, dump: FragmentDump) -> None:
+    occupied = np.flatnonzero(dump.counts).astype(np.uint32)
+    a, b = KBufferDeep(bundle).predict(fresh, occupied).T
     for budget in (dump.total // 5, dump.total // 2):
         on_gpu, on_cpu = (KBufferDeep(bundle, solver=solver).render(fresh, Budget(budget)) for solver in ("gpu", "cpu"))
         assert on_gpu.captured == on_cpu.captured == budget
-        assert (on_gpu.k == on_cpu.k).mean() > 0.999
+        assert (on_gpu.k == on_cpu.k).mean() > 0.99
         assert np.abs(on_gpu.k - on_cpu.k).max() <= 1
+        index = solve_on_lattice(curves_of(a, b), dump.counts[occupied], budget).index
+        assert index is not None
+        t, following = float(price(index)), float(price(index + 1))
+        came_at = (np.maximum(on_gpu.k, on_cpu.k)[occupied] - 1.5) * b - a
+        differ = (on_gpu.k != on_cpu.k)[occupied]
+        assert (np.abs(came_at[differ] - t) <= 2.0 * (following - t) + 1e-5).all()
 
 
 def test_what_onnxruntime_predicts_is_not_solved_on_the_gpu(bundle: Path) -> None:
@@ -170,14 +164,13 @@ def test_bundles_of_other_outputs_meet_the_budget_as_their_networks_say(
     features = derive(gather(dump))
     export_random(tmp_path, network, features[dump.counts > 0], gl)
     deep = KBufferDeep(tmp_path)
-    pixels = np.flatnonzero(dump.counts > 1).astype(np.uint32)
+    pixels = np.flatnonzero(dump.counts).astype(np.uint32)
     expected = network.run(features[pixels])
     np.testing.assert_allclose(deep.predict(fresh, pixels), expected, rtol=1e-3, atol=1e-3)
     n, budget = dump.counts[pixels], dump.total // 3
-    left = budget - int(np.count_nonzero(dump.counts == 1))
-    chosen = budget_fill(expected[:, 0], n, left, 1) if head == "importance" else None
+    chosen = budget_fill(expected[:, 0], n, budget) if head == "importance" else None
     if chosen is None:
-        chosen, _ = solve_lambda(expected[:, 0], expected[:, 1], n, left, 1)
+        chosen, _ = solve_lambda(expected[:, 0], expected[:, 1], n, budget)
     rendered = deep.render(fresh, Budget(budget))
     assert rendered.captured == budget
     assert (rendered.k[pixels] == chosen).mean() > 0.99
@@ -228,7 +221,6 @@ def test_only_what_the_bundle_reads_is_gathered(
     assert rendered.skips[UNREAD_SUMS] == (0 if full else 2)
     gathered = frame.gather("gather", texels_of(network.features))
     assert gathered.pixel_bytes == (5 * 16 + 4 if full else 3 * 16 + 4)
-    assert rendered.skips[SETTLED_PIXELS] == np.count_nonzero(dump.counts == 1)
 
 
 @pytest.mark.parametrize("names", [("log_n", "alpha_mean", "depth_extent"), ("depth_extent",)])

@@ -13,7 +13,7 @@ from labeller import reference
 from renderer import programs
 from renderer.programs import Programs
 from renderer.reference import moment
-from renderer.techniques import TECHNIQUES, Budget, KBuffer, KBufferDeep, KBufferDynamic, KBufferOptimal, Needs
+from renderer.techniques import TECHNIQUES, Budget, KBufferDeep, KBufferDynamic, KBufferOptimal, Needs
 from renderer.techniques.ordered import Ordered, capture_ordered
 from services.stress import gl, gl_bounds, gl_capture, gl_child, gl_moment, gl_network, gl_refused, gl_techniques
 from services.stress.findings import Broken, Finding, Options
@@ -163,14 +163,15 @@ def test_curves_that_stay_nan_are_a_violation(
     replaced(monkeypatch, "kbuffer-deep/curves.comp", "is_nan ? least", "is_nan ? x")
     case = make_case(gl, CASES["alpha 0 and 1"], Programs(gl))
     rows = gl_techniques.bounded_rows(case, truth, deep.name, needs, "here", form)
-    assert [row.path for row in rows if not row.ok] == ["overflowing.F, K and k_min · here"]
+    assert [row.path for row in rows if not row.ok] == ["overflowing.F and K · here"]
 
 
 def test_a_picture_that_is_not_finite_is_a_violation(gl: moderngl.Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    replaced(monkeypatch, "sbuffer/resolve.frag", "vec4(over(light", "vec4(sqrt(light.rgb - 9.0) + over(light")
     replaced(monkeypatch, "kbuffer/resolve.frag", "light.rgb + light.a", "sqrt(light.rgb - 9.0) + light.a")
     case = make_case(gl, CASES["alpha 0 and 1"], Programs(gl))
     assert not picture(case, "sbuffer")[0].ok
-    limits = [row for row in chain(case) if "k_min" in row.path]
+    limits = [row for row in chain(case) if "F and K" in row.path]
     assert [row.ok for row in limits] == [False]
     assert "not finite" in limits[0].where
 
@@ -179,7 +180,7 @@ def test_a_broken_twin_is_a_violation(gl: moderngl.Context, shared: Programs, mo
     case = make_case(gl, CASES["alpha 0 and 1"], shared)
     composite, share = reference.composite, moment.share_before
     monkeypatch.setattr(reference, "composite", lambda *args: composite(*args) + 1e-5)
-    assert not any(row.ok for row in chain(case) if "k_min" not in row.path)
+    assert not any(row.ok for row in chain(case) if "F and K" not in row.path)
     monkeypatch.setattr(moment, "share_before", lambda *args: 0.99 * share(*args))
     assert not picture(case, "moment")[0].ok
 
@@ -219,8 +220,8 @@ def test_every_way_to_break_a_budget_is_named(gl: moderngl.Context, shared: Prog
 
     assert "above F" in broken(KBufferDynamic.name, k=n.astype(np.int32))
     assert "above n" in broken(KBufferDynamic.name, k=sound.k + 1)
-    assert "below k_min" in broken(KBufferDynamic.name, k=np.zeros_like(sound.k))
-    assert "below k_min" not in broken(KBuffer.name, k=np.zeros_like(sound.k))
+    assert "below 0" in broken(KBufferDynamic.name, k=sound.k - n.max().astype(np.int32) - 1)
+    assert broken(KBufferDynamic.name, k=np.zeros_like(sound.k), captured=0) == "", "k = 0 everywhere is legal"
     assert "leaves a part" in broken(KBufferOptimal.name, k=np.zeros_like(sound.k))
     assert "captured" in broken(KBufferDynamic.name, captured=0)
     assert "finite" in broken(KBufferDynamic.name, linear=np.full_like(sound.linear, np.nan))

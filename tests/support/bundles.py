@@ -17,6 +17,7 @@ from schemas.bundle import (
     file_spec,
     layer_specs,
 )
+from schemas.tail import DEFAULT_TAIL
 
 TOLERANCE = 1e-4
 
@@ -41,9 +42,8 @@ def make_bundle(
         features=(FeatureSpec(name="count", mean=0.0, std=1.0),),
         hidden=(4,),
         layers=layer_specs(1, (4,)),
-        tail=TailSpec(name="density", g=0.75),
+        tail=TailSpec(name=DEFAULT_TAIL, g=0.75),
         metric="display",
-        k_min=1,
         files={name: file_spec(folder / name) for name in FILES},
         onnx=OnnxSpec(opset=17, ir_version=8),
         self_test=SelfTest(

@@ -110,14 +110,14 @@ def test_rows_have_the_hull_of_every_factor(view: FactorView) -> None:
     assert len(view.by_factor) == len(FACTORS)
     part = view.part(np.arange(5, 40, 3))
     for factor, whole, other in zip(FACTORS, view.by_factor, part.by_factor, strict=True):
-        start = lower_hulls(error_curves(DUMP, "density", g=factor), 1)
+        start = lower_hulls(error_curves(DUMP, "density", g=factor))
         for given_view in (whole, other):
             assert np.array_equal(given_view.n, (view if given_view is whole else part).n)
             gained = np.add.reduceat(
                 np.append(given_view.slopes * given_view.lengths, np.float32(0.0)), given_view.offsets[:-1]
             )
             gained[np.diff(given_view.offsets) == 0] = 0.0
-            # What all segments gain is the error of k_min, and of some pixel of the view.
+            # What all segments gain is the error of k = 0, and of some pixel of the view.
             assert np.isin(np.round(gained, 5), np.round(np.append(start.error, np.float32(0.0)), 5)).all()
 
 

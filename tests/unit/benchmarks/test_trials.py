@@ -120,7 +120,7 @@ def test_a_view_that_is_gone_has_no_rows(tmp_path: Path) -> None:
     halves = sorted((remapped(one, remap) for remap in REMAPS["cuts"]), key=lambda half: half.total)
     assert [half.total for half in halves] == [0, DUMP.total]
     curves = error_curves(halves[0], "density-16")
-    write_shard(tmp_path / "none.safetensors", halves[0], curves, lower_hulls(curves, 1), [DUMP.pixels])
+    write_shard(tmp_path / "none.safetensors", halves[0], curves, lower_hulls(curves), [DUMP.pixels])
     assert len(read_shard(tmp_path / "none.safetensors").n) == 0
 
 
@@ -150,10 +150,10 @@ def test_a_teacher_is_asked_where_it_stops(views: list[ViewData]) -> None:
     k, gains = taught_gains(teacher, batch, batch.features)
     a, b = teacher.answer(batch.features).astype(np.float64).T
     for i in range(len(k)):
-        wanted = min(max(1.0 + (a[i] - batch.log_lambda[i]) / b[i], batch.k_min[i]), batch.n[i])
+        wanted = min(max(1.0 + (a[i] - batch.log_lambda[i]) / b[i], 0.0), batch.n[i])
         assert k[i] == pytest.approx(wanted, rel=1e-5)
         assert gains[i] == pytest.approx(a[i] - b[i] * (wanted - 1.0), rel=1e-4, abs=1e-4)
-    inside = (k > batch.k_min) & (k < batch.n)
+    inside = (k > 0.0) & (k < batch.n)
     assert inside.any()
     np.testing.assert_allclose(gains[inside], batch.log_lambda[inside], atol=1e-4)
 

@@ -38,7 +38,6 @@ DESCRIPTION = Description(
     name="glass",
     tail=TailSpec(name="density", g=0.75),
     metric="display",
-    k_min=1,
     provenance=Provenance(scenes={"vase": "ab12"}, code_version="cd34", seed=0, machine="a test"),
     evaluation={"q": {"1": 0.5}},
 )

@@ -3,9 +3,8 @@ struct State {
     fragments: u32,    // N
     occupied: u32,     // pixels with fragments
     deepest: u32,      // fragments of the fullest pixel
-    k_min: u32,        // 1 where the budget covers every occupied pixel
-    complete: u32,     // 1 where it covers every fragment
-    left: u32,         // budget of the open pixels: those whose k their count alone does not settle
+    complete: u32,     // 1 where the budget covers every fragment
+    budget: u32,       // fragments to spend
     sure: u32,         // slots of all pixels at the price `low`
     low: i32,          // greatest index of a price known to be within the budget
     high: i32,         // an index above `low` that is beyond it, or LAST
