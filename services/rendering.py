@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import metrics
+from renderer.exact_bytes import exact_bytes, fits
 from renderer.exr import camera_attributes, write_exr
 from renderer.exr_header import Attribute
 from renderer.frame import Frame
@@ -56,7 +57,8 @@ class Picture:
         passes: Milliseconds of each pass.
         pool_bytes: Storage that grows with fragments or slots.
         pixel_bytes: All other buffers beside it, bytes a pixel.
-        total_bytes: Peak of the frame.
+        total_bytes: Peak of the frame. Of an exact technique also where there is no picture: what it would need.
+        fits: Whether the pool fits one storage buffer; a larger one is rendered in bands of rows, or not at all.
         skips: What was not needed -> how often.
         mse: Against the exact picture, 8-bit sRGB, values in [0,1]; None if it was not compared.
         psnr: dB; None also for no error.
@@ -83,6 +85,7 @@ class Picture:
     pool_bytes: int | None = None
     pixel_bytes: int | None = None
     total_bytes: int | None = None
+    fits: bool = True
     skips: dict[str, int] | None = None
     mse: float | None = None
     psnr: float | None = None
@@ -197,7 +200,7 @@ def _picture(job: _Job, each: Technique, path: Path, options: RenderOptions, war
     except Problem as problem:
         if problem.code != ExitCode.LIMIT or len(options.techniques) == 1:
             raise
-        return replace(about, problem=problem.title)
+        return _unrendered(about, job, options, problem)
     found = _measured(about, rendered, frame)
     if options.compare:
         found = _compared(found, rendered, _shoot(job, SBuffer(), budget, job.size, options)[1])
@@ -213,6 +216,24 @@ def _shoot(
     return frame, each.render(frame, budget)
 
 
+def _unrendered(about: Picture, job: _Job, options: RenderOptions, problem: Problem) -> Picture:
+    """Why there is no picture, and the bytes that an exact technique would need for one."""
+    found = replace(about, problem=problem.title)
+    if about.family != "exact":
+        return found
+    n = Frame(job.scene.gpu(), job.chosen.view, *job.size, options.background).count()
+    needed = exact_bytes(about.technique, n)
+    assert needed is not None, "every exact technique says what it needs"
+    return replace(
+        found,
+        fragments=int(n.sum(dtype=np.int64)),
+        pool_bytes=needed.pool,
+        pixel_bytes=needed.pixel,
+        total_bytes=needed.total,
+        fits=fits(needed.pool),
+    )
+
+
 def _measured(about: Picture, rendered: Rendered, frame: Frame) -> Picture:
     n = frame.count()
     k = rendered.k[n > 0]
@@ -226,6 +247,7 @@ def _measured(about: Picture, rendered: Rendered, frame: Frame) -> Picture:
         pool_bytes=rendered.pool_bytes,
         pixel_bytes=rendered.pixel_bytes,
         total_bytes=rendered.total_bytes,
+        fits=fits(rendered.pool_bytes),
         skips={what: count for what, count in skips.items() if count},
     )
 

@@ -27,9 +27,9 @@ from renderer.tiles import Tiles, tiles_of
 _OVER, _NONE = 0xFFFFFFFF, 0
 _FRESH = np.array([_OVER, _NONE, _OVER, _OVER], dtype=np.uint32)
 """`Side` of depth-peeling/side.glsl where nothing is yet."""
-_SIDE_BYTES = 16 + 4
+SIDE_BYTES = 16 + 4
 """A `Side` and its counts."""
-_BACK_BYTES = 12
+BACK_BYTES = 12
 """What is composited from the back, float32 RGB."""
 
 # Storage bindings of */begin.frag, */peel.frag, */step.frag and */resolve.frag.
@@ -66,7 +66,7 @@ def render_peeled(frame: Frame, shaders: str, sides: int) -> Rendered:
         passes={**frame.passes("opaque"), **clock.passes},
         captured=int(n.sum(dtype=np.int64)),
         pool_bytes=0,
-        pixel_bytes=sides * _SIDE_BYTES + (sides - 1) * _BACK_BYTES,
+        pixel_bytes=sides * SIDE_BYTES + (sides - 1) * BACK_BYTES,
         skips=frame_skips(frame, counted.tiles),
     )
 
