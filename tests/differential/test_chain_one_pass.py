@@ -61,7 +61,7 @@ def test_forms_differ_only_by_the_order_of_the_tails_sums(
 
 def test_passes_are_named_by_the_form(frame: Frame, k: NDArray[np.int32], form: ChainForm) -> None:
     chain = ["chain"] if form == "one-pass" else ["chain-depth", "chain-colour"]
-    assert list(render(frame, k, form).passes) == ["opaque", "count", "gather-tail", "prefix", *chain, "resolve"]
+    assert list(render(frame, k, form).passes) == ["opaque", "count", "gather", "prefix", *chain, "resolve"]
 
 
 def test_the_best_form_that_the_driver_has_is_chosen(
@@ -105,19 +105,19 @@ def test_enough_slots_need_no_tail(gl: moderngl.Context, dump: FragmentDump, for
         assert (rendered.pool_bytes, rendered.pixel_bytes) == (pool, 12 + 4)
     one_less = KBuffer().render(fresh, Budget((most - 1) * dump.pixels, "density", chain=form))
     assert one_less.skips[TAIL] == 0
-    assert one_less.pixel_bytes == 12 + 4 + 16 + 2 * 16
+    assert one_less.pixel_bytes == 12 + 4 + 16 + 32
 
 
 def test_importance_is_not_computed_where_all_fits(gl: moderngl.Context, dump: FragmentDump, form: ChainForm) -> None:
     fresh = Frame(GpuScene(gl, shells()), VIEW, *SIZE)
     rendered = KBufferImportance().render(fresh, Budget(dump.total, chain=form))
     assert (rendered.skips[PREDICTOR], rendered.skips[TAIL]) == (1, 1)
-    assert not {"importance", "gather-nearest"} & set(rendered.passes)
+    assert not {"importance", "facing"} & set(rendered.passes)
     exact = composite(dump, dump.counts).reshape(rendered.linear.shape)
     np.testing.assert_allclose(rendered.linear, exact, atol=1e-6, rtol=0)
     less = KBufferImportance().render(fresh, Budget(dump.total - 1, chain=form))
     assert PREDICTOR not in less.skips
-    assert {"importance", "gather-nearest"} < set(less.passes)
+    assert {"importance", "facing"} < set(less.passes)
 
 
 def test_no_slots_at_all_is_all_tail(frame: Frame, dump: FragmentDump, form: ChainForm) -> None:

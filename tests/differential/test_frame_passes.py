@@ -14,7 +14,6 @@ from renderer.bands import row_bands
 from renderer.capture import capture
 from renderer.csr import offsets_of
 from renderer.culling import Ranges
-from renderer.features import gather
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.hidden import hidden_fragments
@@ -136,7 +135,7 @@ class _Everything:
 
 
 def _assert_same(dump: FragmentDump, other: FragmentDump) -> None:
-    for field in ("offsets", "rgba", "depth", "background", "facing"):
+    for field in ("offsets", "rgba", "depth", "background", "facing", "tile_range"):
         assert np.array_equal(getattr(dump, field), getattr(other, field)), field
 
 
@@ -149,20 +148,22 @@ def test_row_bands_cover_every_fragment_once_within_capacity() -> None:
     assert max(sizes) <= 130
 
 
-def test_gathered_sums_equal_those_of_the_dump(frame: Frame, dump: FragmentDump) -> None:
-    made = frame.gather("gather")
-    texels = [np.frombuffer(t.read(), dtype=np.float32).reshape(-1, 4) for t in made.sums]
-    expected = gather(dump)
-    occupied = dump.counts > 0
-    for index, texel in enumerate(texels):
-        columns = 4 if index < 3 else 3
-        np.testing.assert_allclose(
-            texel[:, :columns][occupied], expected[occupied, 4 * index : 4 * index + columns], rtol=2e-5, atol=2e-5
-        )
-    _, z_min, z_max = frame.depth_range()
-    for buffer, column in ((z_min, 15), (z_max, 19)):
-        depth = np.frombuffer(buffer.read(), dtype=np.float32)[: dump.pixels]
-        assert np.array_equal(depth[occupied], expected[occupied, column])
-    assert made.nearest_colour is not None
-    words = np.frombuffer(made.nearest_colour.read(), dtype=np.uint32)[: dump.pixels]
-    assert np.array_equal(words[occupied], dump.rgba.view("<u4").ravel()[dump.offsets[:-1][occupied]])
+def test_ranges_of_pixels_and_what_the_density_tail_reads_equal_those_of_the_dump(
+    frame: Frame, dump: FragmentDump
+) -> None:
+    occupied, first, end = dump.counts > 0, dump.offsets[:-1], dump.offsets[1:]
+    n, z_min, z_max = (np.frombuffer(buffer.read(), dtype=np.uint32)[: dump.pixels] for buffer in frame.depth_range())
+    assert np.array_equal(n, dump.counts)
+    assert np.array_equal(z_min.view(np.float32)[occupied], dump.depth[first[occupied]])
+    assert np.array_equal(z_max.view(np.float32)[occupied], dump.depth[end[occupied] - 1])
+    alpha, pixel = dump.rgba[:, 3] / 255.0, np.repeat(np.arange(dump.pixels), dump.counts)
+    sums = [np.ones(dump.total), alpha, alpha * alpha, -np.log(1.0 - alpha)]
+    expected = np.stack([np.bincount(pixel, weights, dump.pixels) for weights in sums], axis=1)
+    texels = np.frombuffer(frame.gather_density().read(), dtype=np.float32).reshape(-1, 4)
+    np.testing.assert_allclose(texels, expected, rtol=2e-5, atol=2e-5)
+
+
+def test_facing_is_that_of_the_nearest_fragment(frame: Frame, dump: FragmentDump) -> None:
+    facing = np.frombuffer(frame.gather_facing().read(), dtype=np.uint32)[: dump.pixels]
+    assert np.array_equal(facing, dump.facing)
+    assert facing.any()

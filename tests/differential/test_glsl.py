@@ -19,12 +19,12 @@ from support.training import export_random, random_weights
 from renderer import programs
 from renderer.capture import capture
 from renderer.features import derive, gather
-from renderer.frame import BIN_DEFINES, Frame
+from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.hidden import hidden_fragments
 from renderer.programs import SHADERS, Defines, expand
 from renderer.techniques import TECHNIQUES, Budget, KBufferDeep, Needs, technique
-from schemas.tail import MAX_EXPONENT, TAILS
+from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, MAX_EXPONENT, NO_TAIL, TAIL_NAMES, TAILS, TailKind
 
 STAGES = (".vert", ".frag", ".comp")
 FULLSCREEN = ("common/fullscreen.vert", "benchmark/empty.frag")
@@ -51,24 +51,29 @@ def compiled(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> 
         dump = capture(frame).dump
         hidden_fragments(frame)
         bundle = tmp_path_factory.mktemp("bundle")
-        features = derive(gather(dump))[dump.counts > 0]
+        features = derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0]
         export_random(bundle, random_weights(4), features, gl)
         export_random(
             bundle / "importances", random_weights(4, head="importance", outputs=("importance",)), features, gl
         )
         needs = Needs(bundle=bundle, allocate=lambda frame, _: np.minimum(frame.count(), 2).astype(np.int32))
         for folder in (bundle, bundle / "importances"):
-            KBufferDeep(folder).render(frame, Budget(dump.total // 2, chain="two-pass"))
-            # Rows that are read back, as tests and the solver on the CPU do.
-            KBufferDeep(folder, solver="cpu").render(frame, Budget(dump.total // 2, chain="two-pass"))
+            deep, listed = KBufferDeep(folder), np.flatnonzero(dump.counts).astype(np.uint32)
+            deep.render(frame, Budget(dump.total // 2))
+            # Rows that are read back, as a runtime on the CPU does.
+            deep.predict(frame, listed)
+            deep.features(frame, listed)
+        for tail in BINNED_TAILS:
+            for colours in (False, True):
+                frame.gather_bins(tail, colours=colours, counts=True)
         for name in TECHNIQUES:
-            for tail in TAILS if name == "kbuffer" else TAILS[:1]:
+            for tail in TAIL_NAMES if name == "kbuffer" else (DEFAULT_TAIL,):
                 technique(name, needs).render(frame, Budget(dump.total // 2, tail, chain="two-pass"))
-    for tail_code in range(-1, 5):  # the driver may lack what it needs
+    without: Defines = {"TAIL": NO_TAIL, **{f"TAIL_{kind.name}": int(kind) for kind in TailKind}}
+    for row in (without, *(tail.defines for tail in TAILS.values())):  # the driver may lack what it needs
         for surface in ({"TEXTURED": 0, "MIXED": 0}, {"TEXTURED": 1, "MIXED": 1}):
-            defines = {"TAIL": tail_code, "MAX_EXPONENT": MAX_EXPONENT, "WRAPPED": 0, "MORE_UVS": 0, "EMISSIVE": 0}
-            bins = {"BINS": 16, **BIN_DEFINES} if tail_code == 4 else {}
-            recorded("kbuffer/chain.frag", {**defines, **surface, **bins})
+            defines = {**row, "MAX_EXPONENT": MAX_EXPONENT, "WRAPPED": 0, "MORE_UVS": 0, "EMISSIVE": 0}
+            recorded("kbuffer/chain.frag", {**defines, **surface})
     return texts
 
 

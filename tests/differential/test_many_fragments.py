@@ -21,7 +21,7 @@ from renderer.techniques import TECHNIQUES, Adaptive, Budget, Multilayer, Needs,
 from renderer.techniques.ordered import capture_ordered
 from schemas.bundle import Provenance, TailSpec
 from schemas.fragments import FragmentDump
-from schemas.tail import TAILS, TailName
+from schemas.tail import DEFAULT_TAIL, TAILS, TailName
 from services.stress.gl_stacks import STRIDE, VIEW, extreme_stacks, size, stack_scene
 from trainer.bundle import Description, export_bundle
 
@@ -70,12 +70,14 @@ def needs(case: Case, gl: moderngl.Context, tmp_path_factory: pytest.TempPathFac
 def make_bundle(dump: FragmentDump, gl: moderngl.Context, folder: Path) -> Path:
     description = Description(
         name="random",
-        tail=TailSpec(name="density", g=0.75),
+        tail=TailSpec(name=DEFAULT_TAIL, g=0.75),
         metric="display",
         provenance=Provenance(scenes={}, code_version="0", seed=0, machine="test"),
         evaluation={},
     )
-    export_bundle(folder, random_weights(11, FEATURES, (8,)), description, derive(gather(dump))[dump.counts > 0], gl)
+    export_bundle(
+        folder, random_weights(11, FEATURES, (8,)), description, derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0], gl
+    )
     return folder
 
 

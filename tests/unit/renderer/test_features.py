@@ -11,94 +11,111 @@ from numpy.typing import NDArray
 from support.dumps import dump_of, random_dump
 
 import renderer
-from renderer.features import FEATURES, SUMS, derive, features_glsl, gather
+from labeller import reference
+from renderer.features import FEATURES, SUMS, derive, features_glsl, gather, reads_colours, sums_read
 from schemas.fragments import FragmentDump
+from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, OPTICAL_UNIT, TAILS, TailName
 
 
-def plain_sums(dump: FragmentDump) -> NDArray[np.float64]:
+def placed(dump: FragmentDump, p: int, bins: int) -> NDArray[np.float64]:
+    """Places of a pixel's fragments between the ends of its tile's range, 0 to 1, as bins see them."""
+    pixel = reference.pixel_of(dump, p)
+    x = (pixel.depth - pixel.nearest) / pixel.extent if pixel.extent > 0.0 else np.zeros(pixel.n)
+    x = np.clip(x, 0.0, 1.0)
+    return np.asarray(0.4 * x + 0.6 * np.sqrt(x))
+
+
+def plain_sums(dump: FragmentDump, tail: TailName) -> NDArray[np.float64]:
     """Raw sums, pixel by pixel as the definition says."""
-    out = np.zeros((dump.pixels, len(SUMS)))
-    for p in range(dump.pixels):
-        part = slice(dump.offsets[p], dump.offsets[p + 1])
-        rgba, z = dump.rgba[part] / 255.0, dump.depth[part].astype(np.float64)
-        if not len(z):
-            continue
-        colour, a = rgba[:, :3], rgba[:, 3]
-        x = (z - z.min()) / (z.max() - z.min()) if z.max() > z.min() else np.zeros(len(z))
-        out[p, 0:4] = len(z), a.sum(), (a * a).sum(), -np.log(1.0 - a).sum()
-        out[p, 4:7], out[p, 7] = colour.sum(axis=0), x.sum()
-        out[p, 8:11], out[p, 11] = (colour * a[:, None]).sum(axis=0), (x * x).sum()
-        out[p, 12:15], out[p, 15] = (colour * colour).sum(axis=0), z.min()
-        out[p, 16:19], out[p, 19] = (colour * x[:, None]).sum(axis=0), z.max()
-        out[p, 20:24], out[p, 24:27] = rgba[0], dump.background[p] / 255.0
-    return out
-
-
-def plain_features(dump: FragmentDump) -> NDArray[np.float64]:
-    """Features from the fragments themselves, not from sums."""
-    out = np.zeros((dump.pixels, len(FEATURES)))
-    for p in range(dump.pixels):
-        part = slice(dump.offsets[p], dump.offsets[p + 1])
-        rgba, z = dump.rgba[part] / 255.0, dump.depth[part].astype(np.float64)
-        if not len(z):
-            continue
-        colour, a = rgba[:, :3], rgba[:, 3]
-        x = (z - z.min()) / (z.max() - z.min()) if z.max() > z.min() else np.zeros(len(z))
+    out, row = np.zeros((dump.pixels, len(SUMS))), TAILS[tail]
+    for p in np.flatnonzero(dump.counts):
+        pixel = reference.pixel_of(dump, int(p), stored=True)
+        light, y = -np.log(1.0 - pixel.alpha), placed(dump, int(p), row.bins)
+        bins = reference.depth_bins(pixel, light, row)
+        luma = pixel.colour @ np.array([0.2126, 0.7152, 0.0722])
         values = {
-            "log_n": math.log2(len(z)),
-            "optical_depth": math.log1p(-np.log(1.0 - a).sum()),
-            "alpha_mean": a.mean(),
-            "alpha_std": a.std(),
-            "alpha_nearest": a[0],
-            "depth_mean": x.mean(),
-            "depth_std": x.std(),
-            "depth_extent": math.log(1e-4 + (z.max() - z.min()) / z.max()),
+            "n": pixel.n,
+            "optical_depth": bins.units / OPTICAL_UNIT,
+            "z_near": pixel.nearest,
+            "z_far": pixel.nearest + pixel.extent,
+            "sum_l_y_luma": (light * y * luma).sum(),
+            "sum_l_y": (light * y).sum(),
+            **{f"front_{b}": bins.front[b] for b in range(1, row.bins)},
+            **({f"mean_{b}": bins.mean[b - 1] for b in range(1, row.bins)} if row.mean_levels else {}),
         }
         for i, c in enumerate("rgb"):
             values |= {
-                f"rgb_mean_{c}": colour[:, i].mean(),
-                f"rgb_alpha_{c}": (a * colour[:, i]).sum() / a.sum(),
-                f"rgb_nearest_{c}": colour[0, i],
-                f"background_{c}": dump.background[p, i] / 255.0,
-                f"rgb_std_{c}": colour[:, i].std(),
-                f"rgb_depth_cov_{c}": ((colour[:, i] - colour[:, i].mean()) * (x - x.mean())).mean(),
+                f"sum_l_{c}": (light * pixel.colour[:, i]).sum(),
+                f"sum_l_{c}2": (light * pixel.colour[:, i] ** 2).sum(),
+                f"background_{c}": pixel.background[i],
             }
-        out[p] = [values.get(name, 0.0) for name in FEATURES]  # without depth bins there are no shares in front
+        out[p] = [values.get(name, 0.0) for name in SUMS]
     return out
 
 
-def assert_features_close(actual: NDArray[np.float32], expected: NDArray[np.float64] | NDArray[np.float32]) -> None:
+def plain_features(dump: FragmentDump, tail: TailName) -> NDArray[np.float64]:
+    """Features from the fragments themselves, not from sums."""
+    out, row = np.zeros((dump.pixels, len(FEATURES))), TAILS[tail]
+    for p in np.flatnonzero(dump.counts):
+        pixel = reference.pixel_of(dump, int(p), stored=True)
+        light, y = -np.log(1.0 - pixel.alpha), placed(dump, int(p), row.bins)
+        bins = reference.depth_bins(pixel, light, row)
+        optical, weight = bins.units / OPTICAL_UNIT, light / (bins.units / OPTICAL_UNIT)
+        mean, luma = weight @ pixel.colour, pixel.colour @ np.array([0.2126, 0.7152, 0.0722])
+        far = pixel.nearest + pixel.extent
+        values = {
+            "log_n": math.log2(pixel.n),
+            "optical_depth": math.log1p(optical),
+            "depth_mean": weight @ y,
+            "luma_depth_cov": weight @ (y * luma) - (weight @ y) * (weight @ luma),
+            "depth_extent": math.log(1e-4 + pixel.extent / far),
+            **{f"front_{b}": bins.front[b] for b in range(1, row.bins)},
+            **({f"mean_{b}": bins.mean[b - 1] for b in range(1, row.bins)} if row.mean_levels else {}),
+        }
+        for i, c in enumerate("rgb"):
+            spread = weight @ pixel.colour[:, i] ** 2 - mean[i] ** 2
+            values |= {
+                f"rgb_mean_{c}": mean[i],
+                f"rgb_std_{c}": math.sqrt(max(0.001, spread)),
+                f"background_{c}": pixel.background[i],
+            }
+        out[p] = [values.get(name, 0.0) for name in FEATURES]
+    return out
+
+
+def assert_features_close(actual: NDArray[np.float32], expected: NDArray[np.float64]) -> None:
     """Spreads are square roots of float32 differences of sums: their squares are compared."""
-    spread = [name.endswith("std") or "_std_" in name for name in FEATURES]
+    spread = ["_std" in name for name in FEATURES]
     assert np.abs(actual[:, spread] ** 2 - expected[:, spread] ** 2).max() < 2e-6
     rest = np.logical_not(spread)
     assert np.abs(actual[:, rest] - expected[:, rest]).max() < 1e-5
 
 
-def test_sums_are_those_of_the_definition() -> None:
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+def test_sums_are_those_of_the_definition(tail: TailName) -> None:
     dump = random_dump(37, 11, 20, seed=1)
-    np.testing.assert_allclose(gather(dump), plain_sums(dump), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(gather(dump, tail), plain_sums(dump, tail), rtol=2e-6, atol=2e-6)
 
 
+@pytest.mark.parametrize("tail", BINNED_TAILS)
 @pytest.mark.parametrize("max_n", [1, 6, 300])
-def test_features_are_those_of_the_fragments(max_n: int) -> None:
+def test_features_are_those_of_the_fragments(tail: TailName, max_n: int) -> None:
     dump = random_dump(16, 9, max_n, seed=2)
-    assert_features_close(derive(gather(dump)), plain_features(dump))
+    assert_features_close(derive(gather(dump, tail)), plain_features(dump, tail))
 
 
 def test_equal_depths_have_no_extent() -> None:
     rgba = np.array([[10, 20, 30, 1], [200, 100, 50, 254]], np.uint8)
-    features = derive(gather(dump_of([(rgba, np.array([5.0, 5.0], np.float32))])))[0]
+    features = derive(gather(dump_of([(rgba, np.array([5.0, 5.0], np.float32))]), DEFAULT_TAIL))[0]
     named = dict(zip(FEATURES, features, strict=True))
-    assert named["depth_mean"] == named["depth_std"] == 0.0
+    assert named["depth_mean"] == named["luma_depth_cov"] == 0.0
     assert named["depth_extent"] == pytest.approx(math.log(1e-4), rel=1e-6)
-    assert named["rgb_depth_cov_r"] == 0.0
 
 
 def test_extreme_depths_stay_finite() -> None:
     rgba = np.tile(np.array([[0, 255, 3, 128]], np.uint8), (2, 1))
     near_and_far = (rgba, np.array([1e-38, 3e38], np.float32))
-    features = derive(gather(dump_of([near_and_far, near_and_far])))
+    features = derive(gather(dump_of([near_and_far, near_and_far]), DEFAULT_TAIL))
     assert np.isfinite(features).all()
 
 
@@ -106,11 +123,11 @@ def test_pixels_without_fragments_are_zero() -> None:
     dump = random_dump(20, 20, 2, seed=3)
     empty = dump.counts == 0
     assert empty.any()
-    sums = gather(dump)
+    sums = gather(dump, DEFAULT_TAIL)
     assert not sums[empty].any()
     assert not derive(sums)[empty].any()
     with_background = sums.copy()
-    with_background[:, 24:27] = 0.5
+    with_background[:, SUMS.index("background_r") : SUMS.index("background_b") + 1] = 0.5
     assert not derive(with_background)[empty].any()
 
 
@@ -120,7 +137,7 @@ def test_committed_glsl_is_the_generated_one() -> None:
 
 
 def test_a_subset_holds_only_what_is_asked_for() -> None:
-    text = features_glsl(("depth_std", "log_n"))
+    text = features_glsl(("rgb_std_g", "log_n"))
     assert "#define DIAPHANE_FEATURES 2" in text
     assert "x[0] = sqrt" in text
     assert "x[1] = log2" in text
@@ -130,3 +147,11 @@ def test_a_subset_holds_only_what_is_asked_for() -> None:
 def test_an_unknown_feature_is_refused() -> None:
     with pytest.raises(KeyError):
         features_glsl(("log_n", "x[0]; discard"))
+
+
+def test_what_features_read_follows_from_their_formulas() -> None:
+    assert sums_read(("log_n", "optical_depth")) == {"n", "optical_depth"}
+    assert sums_read(("depth_extent",)) == {"z_near", "z_far"}
+    assert not reads_colours(("log_n", "background_r", "front_3", "mean_2", "depth_extent"))
+    for name in ("rgb_mean_r", "rgb_std_b", "depth_mean", "luma_depth_cov"):
+        assert reads_colours((name,))
