@@ -7,7 +7,7 @@ its moves, what was seen, and n.
 
 - A move is a share of what the curve was wrong by: half of it at first, a third in the next frame, and so on. With a
   constant share, pixels jump to and fro between two k for ever; so they settle, and a still camera's picture stands
-  still after `FRAMES` frames.
+  still once its pixels have learnt from `FRAMES` frames each; one without a core sees nothing in a frame.
 - While the camera moves, a pixel's memory stays at its place in the window. It is forgotten where n is another by more
   than an eighth, and shares do not become smaller than a ninth. Moving memories with the nearest fragments was tried
   on one scene, and was no better.

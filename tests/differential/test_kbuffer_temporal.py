@@ -7,28 +7,26 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from support.scenes import SIZE, VIEW, shells
-from support.training import export_random, random_weights
+from support.training import export_overflowing, export_random, random_weights
 
 from benchmarks.temporal import SHOWN, STEPS, measure, page
 from labeller.curves import composite, error_curves
-from renderer.allocation.lattice import curves_of, solve_on_lattice
+from renderer.allocation.cuts import events_of, solve_cuts
 from renderer.features import derive, gather
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.reference import temporal as twin
 from renderer.techniques import Budget, KBufferDeep, KBufferTemporal
-from renderer.techniques.chain import one_pass_available
 from renderer.techniques.kbuffer_temporal import FRAMES, MEMORY_BYTES, MOVING_FRAMES, SETTLED, is_cut
 from schemas.bundle import load_manifest
 from schemas.fragments import FragmentDump
 from schemas.problem import ExitCode, Problem
-from schemas.tail import TailName
+from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, TailName
 from schemas.view import View
 from services.bench.measure import over
 from services.bench.subject import Subject
-from services.stress.gl_network import random_networks
-from services.stress.predictors import networks, real_features
 from services.versions import machine
 
 SMALL = (64, 48)
@@ -50,7 +48,7 @@ def gpu(gl: moderngl.Context) -> GpuScene:
 @pytest.fixture(scope="module")
 def bundle(dump: FragmentDump, gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("bundle")
-    export_random(folder, random_weights(11), derive(gather(dump))[dump.counts > 0], gl)
+    export_random(folder, random_weights(11), derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0], gl)
     return folder
 
 
@@ -63,17 +61,21 @@ def fragments_of(dump: FragmentDump, share: float) -> int:
     return int(share * dump.total)
 
 
-@pytest.mark.parametrize("tail", ["density-16", "density-8", "density", "exact-coverage", "weighted-average", "paper"])
-@pytest.mark.parametrize("form", ["one-pass", "two-pass"])
+def counts_of(frame: Frame) -> NDArray[np.uint8]:
+    """uint8 [P, B], fragments of the bins."""
+    counts = frame.gather_bins(DEFAULT_TAIL, counts=True).counts
+    assert counts is not None
+    return np.frombuffer(counts.read(), dtype=np.uint8).reshape(frame.pixels, -1)
+
+
+@pytest.mark.parametrize("tail", BINNED_TAILS)
 def test_first_frame_is_that_of_kbuffer_deep_and_sees_what_last_fragments_change(
-    gpu: GpuScene, bundle: Path, dump: FragmentDump, tail: TailName, form: str
+    gpu: GpuScene, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, tail: TailName
 ) -> None:
-    if form == "one-pass" and not one_pass_available(gpu.ctx):
-        pytest.skip("this driver has no 64-bit atomics")
-    budget = Budget(fragments_of(dump, 0.3), tail, chain="one-pass" if form == "one-pass" else "two-pass")
-    temporal = KBufferTemporal(bundle)
+    export_random(tmp_path, random_weights(11), derive(gather(dump, tail))[dump.counts > 0], gl, tail)
+    budget, temporal = Budget(fragments_of(dump, 0.3), tail), KBufferTemporal(tmp_path)
     first = temporal.render(Frame(gpu, VIEW, *SIZE), budget)
-    plain = KBufferDeep(bundle).render(Frame(gpu, VIEW, *SIZE), budget)
+    plain = KBufferDeep(tmp_path).render(Frame(gpu, VIEW, *SIZE), budget)
     assert np.array_equal(first.linear, plain.linear)
     assert np.array_equal(first.k, plain.k)
     assert first.pixel_bytes == plain.pixel_bytes + MEMORY_BYTES
@@ -104,7 +106,7 @@ def test_next_frames_are_those_of_the_twin(gpu: GpuScene, bundle: Path, moves: b
         frame = Frame(gpu, turned(number if moves else 0), *SIZE)
         rendered = temporal.render(frame, budget)
         n = frame.count()
-        assert rendered.captured == budget.fragments
+        assert budget.fragments - int(n.max()) < rendered.captured <= budget.fragments
         assert (rendered.k >= 0).all()
         assert (rendered.k <= n).all()
         found = memory_of(temporal)
@@ -119,7 +121,8 @@ def test_next_frames_are_those_of_the_twin(gpu: GpuScene, bundle: Path, moves: b
                 apart = np.abs(getattr(found, field) - getattr(expected, field))
                 assert apart.max() <= (field == "correction"), field
                 assert (apart == 0).mean() > 0.99, field
-            k = solve_on_lattice(curves_of(expected_a, b), n, budget.fragments).k
+            k = solve_cuts(events_of(expected_a, b, counts_of(frame)), budget.fragments).k
+            # Corrections are whole steps: a pixel whose correction is rounded the other way may have another cut.
             assert (rendered.k == k).mean() > 0.99
             learnt += int(np.count_nonzero(found.correction))
         before = found
@@ -127,10 +130,11 @@ def test_next_frames_are_those_of_the_twin(gpu: GpuScene, bundle: Path, moves: b
 
 
 def test_it_learns_and_then_stands_still(gpu: GpuScene, bundle: Path, dump: FragmentDump) -> None:
-    curves = error_curves(dump, "density-16")
+    curves = error_curves(dump, DEFAULT_TAIL)
     temporal, budget = KBufferTemporal(bundle), Budget(fragments_of(dump, 0.3))
     errors, ks = [], []
-    for _ in range(FRAMES + 3):
+    # A pixel without a core sees nothing in a frame: this view stands still after 28 frames.
+    for _ in range(2 * FRAMES):
         rendered = temporal.render(Frame(gpu, VIEW, *SIZE), budget)
         errors.append(curves.total(rendered.k))
         ks.append(rendered.k)
@@ -159,10 +163,9 @@ def test_it_begins_anew_with_whatever_is_another(gpu: GpuScene, bundle: Path, gl
     turns = [
         (gpu, VIEW, SMALL, one, "first"),
         (gpu, VIEW, SMALL, two, "budget"),
-        (gpu, VIEW, SMALL, Budget(two.fragments, "density"), "tail"),
-        (gpu, VIEW, (48, 64), Budget(two.fragments, "density"), "size, of as many pixels"),
-        (other, VIEW, (48, 64), Budget(two.fragments, "density"), "scene"),
-        (other, turned(50), (48, 64), Budget(two.fragments, "density"), "view, after a cut"),
+        (gpu, VIEW, (48, 64), two, "size, of as many pixels"),
+        (other, VIEW, (48, 64), two, "scene"),
+        (other, turned(50), (48, 64), two, "view, after a cut"),
     ]
     for scene, view, size, budget, what in turns:
         new = temporal.render(Frame(scene, view, *size), budget).k
@@ -186,8 +189,9 @@ def test_after_a_frame_with_all_its_fragments_it_begins_anew(gpu: GpuScene, bund
         if counted:
             frame.count()
         rendered = temporal.render(frame, budget)
-        assert rendered.captured == budget.fragments
+        assert rendered.captured <= budget.fragments
         if view is far:
+            assert rendered.captured == budget.fragments
             assert np.array_equal(rendered.linear, deep.render(Frame(gpu, view, *SMALL), budget).linear)
     assert np.array_equal(rendered.linear, plain.linear)
 
@@ -219,19 +223,19 @@ def test_small_and_empty_pictures(gpu: GpuScene, bundle: Path, size: tuple[int, 
         temporal = KBufferTemporal(bundle)
         for _ in range(2):
             rendered = temporal.render(Frame(gpu, view, *size), Budget(fragments))
-            assert rendered.captured == min(fragments, n.sum())
+            assert min(fragments, int(n.sum())) - int(n.max()) <= rendered.captured <= fragments
             assert np.isfinite(rendered.linear).all()
 
 
 def test_curves_that_are_no_numbers_stay_within_the_budget(
     gpu: GpuScene, gl: moderngl.Context, dump: FragmentDump, tmp_path: Path
 ) -> None:
-    weights = next(iter(networks(0, real_features(np.random.default_rng(0), 50)).values()))
-    temporal = KBufferTemporal(random_networks(tmp_path, weights, "here").overflowing)
+    export_overflowing(tmp_path, random_weights(3), derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0], gl)
+    temporal = KBufferTemporal(tmp_path)
     for fragments in (0, int(np.count_nonzero(dump.counts)) - 1, dump.total // 3, dump.total - 1):
         for _ in range(2):
-            rendered = temporal.render(Frame(gpu, VIEW, *SIZE), Budget(fragments, "density"))
-            assert rendered.captured == fragments
+            rendered = temporal.render(Frame(gpu, VIEW, *SIZE), Budget(fragments))
+            assert fragments - int(dump.counts.max()) < rendered.captured <= fragments
             assert np.isfinite(rendered.linear).all()
         assert np.abs(memory_of(temporal).correction).max() <= twin.LARGEST
 
@@ -240,7 +244,7 @@ def test_without_curves_on_the_gpu_there_is_nothing_to_correct(
     gpu: GpuScene, bundle: Path, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path
 ) -> None:
     weights = random_weights(5, ("log_n",), (8,), "importance", ("importance",))
-    export_random(tmp_path, weights, derive(gather(dump))[dump.counts > 0], gl)
+    export_random(tmp_path, weights, derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0], gl)
     for temporal in (KBufferTemporal(tmp_path), KBufferTemporal(bundle, "onnx")):
         with pytest.raises(Problem, match="corrects gain curves on the GPU") as caught:
             temporal.render(Frame(gpu, VIEW, *SMALL), Budget(1000))
