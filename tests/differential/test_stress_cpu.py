@@ -154,7 +154,7 @@ def test_the_twins_are_what_the_definitions_say() -> None:
     assert (found["rgb_std_b"], found["background_b"]) == (pytest.approx(np.sqrt(1e-3)), 1.0)
     assert found["depth_mean"] == pytest.approx(share[1], abs=1e-3)  # places 0 and 1
     assert found["luma_depth_cov"] == pytest.approx(share[0] * share[1] * (0.7152 - 0.2126), abs=1e-3)
-    assert {found[f"front_{b}"] for b in range(1, 8)} == {round(255 * share[0]) / 255}
+    assert {found[f"front_{b}"] for b in range(1, 8)} == {round(255 * 212 / (212 + 486)) / 255}  # D in units
     assert {found[f"mean_{b}"] for b in range(1, 8)} == {0.0}
     assert {found[f"front_{b}"] for b in range(8, 16)} == {0.0}
     layers = [(np.array([[2.0], [0.0]], np.float32), np.array([1.0, 0.0], np.float32))]
