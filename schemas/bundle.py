@@ -109,7 +109,7 @@ class TailSpec(BaseModel):
     """The tail whose error curves the predictor was trained on; it must be rendered with the same.
 
     Attributes:
-        name: A tail with depth bins: what is predicted is how many of them are the core.
+        name: Its name.
         g: The density tail's constant.
     """
 
@@ -117,13 +117,6 @@ class TailSpec(BaseModel):
 
     name: TailName
     g: float = Field(ge=0.0)
-
-    @field_validator("name")
-    @classmethod
-    def _has_bins(cls, name: TailName) -> TailName:
-        if name not in BINNED_TAILS:
-            raise ValueError(f"the tail {name} has no depth bins; one of {', '.join(BINNED_TAILS)} has")
-        return name
 
 
 class FileSpec(BaseModel):
@@ -246,7 +239,7 @@ class Manifest(BaseModel):
         features: Inputs of the network, in order.
         hidden: Units of each hidden layer (ReLU).
         layers: Tensors of `weights.safetensors`.
-        tail: Tail of the allocation.
+        tail: Tail of the allocation, with depth bins: what is predicted is how many of them are the core.
         metric: Where the error was measured.
         files: File name -> size and hash.
         onnx: What `model.onnx` needs.
@@ -273,6 +266,13 @@ class Manifest(BaseModel):
     parity: ParityReport
     provenance: Provenance
     evaluation: dict[str, JsonValue]
+
+    @field_validator("tail")
+    @classmethod
+    def _has_bins(cls, tail: TailSpec) -> TailSpec:
+        if tail.name not in BINNED_TAILS:
+            raise ValueError(f"the tail {tail.name} has no depth bins; one of {', '.join(BINNED_TAILS)} has")
+        return tail
 
     @model_validator(mode="after")
     def _exactly_our_files(self) -> Manifest:
