@@ -16,8 +16,10 @@ from benchmarks.labelling.stored import store
 from renderer.capture import capture
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
+from renderer.tile_range import tile_grid, tile_ranges
 from renderer.views import sampled_views
 from schemas.fragments import FragmentDump
+from schemas.tail import RANGE_TILE
 from schemas.view import View
 
 _SEED = 5
@@ -90,14 +92,16 @@ def _around(gpu: GpuScene, view: View, size: tuple[int, int]) -> Iterator[Fragme
 
 
 def row_bands(dump: FragmentDump, count: int) -> Iterator[FragmentDump]:
-    """A dump in bands of rows, from top to bottom.
+    """A dump in bands of whole rows of tiles, from top to bottom: a pixel keeps its depth bins.
 
     Args:
         dump: Fragments of a view.
-        count: How many bands.
+        count: How many bands; fewer, where there are not as many rows of tiles.
     """
-    rows = [dump.height * band // count for band in range(count + 1)]
-    for first, last in pairwise(rows):
+    ranges, (columns, tiles) = tile_ranges(dump), tile_grid(dump.width, dump.height)
+    ends = sorted({tiles * band // count for band in range(count + 1)})
+    for above, below in pairwise(ends):
+        first, last = RANGE_TILE * above, min(RANGE_TILE * below, dump.height)
         pixels = slice(first * dump.width, last * dump.width)
         begin, end = dump.offsets[pixels.start], dump.offsets[pixels.stop]
         yield FragmentDump(
@@ -108,6 +112,7 @@ def row_bands(dump: FragmentDump, count: int) -> Iterator[FragmentDump]:
             depth=dump.depth[begin:end],
             background=dump.background[pixels],
             facing=dump.facing[pixels],
+            tile_range=ranges[columns * above : columns * below],
         )
 
 

@@ -104,6 +104,8 @@ def test_row_bands_put_together_are_the_view() -> None:
         assert np.array_equal(np.concatenate([getattr(band, name) for band in bands]), getattr(DUMP, name))
     assert np.array_equal(np.concatenate([band.counts for band in bands]), DUMP.counts)
     assert all(band.offsets[0] == 0 for band in bands)
+    assert len(bands) == 4
+    assert np.array_equal(np.concatenate([error_curves(band).error for band in bands]), error_curves(DUMP).error)
 
 
 def test_every_part_runs(gl: moderngl.Context, tmp_path: Path) -> None:
