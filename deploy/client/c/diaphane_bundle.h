@@ -72,7 +72,7 @@ typedef struct {
     float *weights;             /* of each layer [in][out], then its biases */
     int files;
     DiaphaneFile file[DIAPHANE_MAX_FILES];
-    /* The self-test, also for what a shader compiler makes of the bundle. None in the first format: then rows is 0. */
+    /* The self-test, also for what a shader compiler makes of the bundle. */
     size_t test_rows, test_pixels;
     double *test_features;      /* [rows][features], not normalised */
     double *test_outputs;       /* [rows][outputs] */
@@ -509,7 +509,7 @@ static double *dia__rows(const dia__json *json, size_t value, size_t columns, si
 
 /* ---- the manifest ---- */
 
-/* The first format has the first three files, the second the first seven and, if the network bears float16, all. */
+/* The first seven, and if the network bears float16, all. */
 static const char *const dia__files[DIAPHANE_MAX_FILES] = {
     "weights.safetensors", "model.onnx", "predict.glsl", "predict_ubo.glsl", "predict_ubo.bin", "predict.wgsl",
     "predict.hlsl", "predict_half.glsl", "predict_ubo_half.glsl", "predict_ubo_half.bin", "predict_half.wgsl"};
@@ -666,19 +666,17 @@ static int dia__read_tail(DiaphaneBundle *bundle, const dia__json *json) {
 
 static int dia__read_outputs(DiaphaneBundle *bundle, const dia__json *json) {
     static const char *const gain[] = {"a", "b", "g"};
-    size_t head = dia__member(json, 0, "head"), outputs = dia__member(json, 0, "outputs"), at = outputs + 1;
+    size_t head = dia__member(json, 0, "head"), outputs = dia__member(json, 0, "outputs"), at = outputs + 1, count;
     int i;
-    bundle->head = head && dia__is(json, head, "importance") ? DIAPHANE_IMPORTANCE : DIAPHANE_GAIN_CURVE;
-    if (head && bundle->head == DIAPHANE_GAIN_CURVE && !dia__is(json, head, "gain-curve")) return 0;
-    bundle->outputs = bundle->head == DIAPHANE_IMPORTANCE ? 1 : 2;
-    if (outputs && json->value[outputs].kind != DIA__ARRAY) return 0;
-    if (outputs && bundle->head == DIAPHANE_GAIN_CURVE && json->value[outputs].count == 3) bundle->outputs = 3;
-    if (outputs && json->value[outputs].count != (size_t)bundle->outputs) return 0;
-    for (i = 0; i < bundle->outputs; ++i) {
+    if (json->value[outputs].kind != DIA__ARRAY) return 0;
+    count = json->value[outputs].count;
+    bundle->head = dia__is(json, head, "importance") ? DIAPHANE_IMPORTANCE : DIAPHANE_GAIN_CURVE;
+    if (bundle->head == DIAPHANE_GAIN_CURVE && !dia__is(json, head, "gain-curve")) return 0;
+    if (bundle->head == DIAPHANE_IMPORTANCE ? count != 1 : count != 2 && count != 3) return 0;
+    bundle->outputs = (int)count;
+    for (i = 0; i < bundle->outputs; ++i, at = json->value[at].next) {
         bundle->output[i] = bundle->head == DIAPHANE_IMPORTANCE ? DIAPHANE_SHARE : (DiaphaneOutput)i;
-        if (!outputs) continue;
         if (!dia__is(json, at, bundle->head == DIAPHANE_IMPORTANCE ? "importance" : gain[i])) return 0;
-        at = json->value[at].next;
     }
     return 1;
 }
@@ -732,9 +730,9 @@ static int dia__read_layers(DiaphaneBundle *bundle, const dia__json *json, Diaph
     return 1;
 }
 
-static int dia__read_files(DiaphaneBundle *bundle, const dia__json *json, int first_format, DiaphaneError *error) {
+static int dia__read_files(DiaphaneBundle *bundle, const dia__json *json, DiaphaneError *error) {
     size_t files = dia__member(json, 0, "files"), count = json->value[files].count, i;
-    int expected = first_format ? count == 3 : count == 7 || count == DIAPHANE_MAX_FILES;
+    int expected = count == 7 || count == DIAPHANE_MAX_FILES;
     if (json->value[files].kind != DIA__OBJECT || !expected)
         return dia__fail(error, "manifest.json: files are not those of a bundle");
     bundle->files = (int)count;
@@ -775,19 +773,17 @@ static int dia__read_self_test(DiaphaneBundle *bundle, const dia__json *json, si
 
 static int dia__read_manifest(DiaphaneBundle *bundle, const dia__json *json, DiaphaneError *error) {
     size_t format = dia__member(json, 0, "format"), test = dia__member(json, 0, "self_test");
-    int first = format && dia__is(json, format, "diaphane-bundle/1");
-    if (format && !first && !dia__is(json, format, "diaphane-bundle/2"))
-        return dia__fail(error, "manifest.json is not of the format diaphane-bundle/1 or /2: update this reader");
-    if (!dia__has_keys(json, 0, "format? name head? outputs? features hidden layers tail metric files onnx? "
-                                "self_test? parity provenance evaluation"))
+    if (format && !dia__is(json, format, "diaphane-bundle/2"))
+        return dia__fail(error, "manifest.json is not of the format diaphane-bundle/2: update this reader");
+    if (!dia__has_keys(json, 0, "format name head outputs features hidden layers tail metric files onnx self_test parity "
+                                "provenance evaluation"))
         return dia__fail(error, "manifest.json is not an object with the keys of a bundle, each once");
     if (!dia__read_name(bundle, json)) return dia__fail(error, "manifest.json: the name is not one of a bundle");
     if (!dia__read_tail(bundle, json)) return dia__fail(error, "manifest.json: a tail without depth bins, or unknown, or an unknown metric");
     if (!dia__read_outputs(bundle, json)) return dia__fail(error, "manifest.json: unknown head or outputs");
     if (!dia__read_features(bundle, json, error) || !dia__read_layers(bundle, json, error)) return 0;
-    if (!dia__read_files(bundle, json, first, error)) return 0;
-    if (test && json->value[test].kind != DIA__OBJECT) test = 0;
-    if (test ? !dia__read_self_test(bundle, json, test) : !first)
+    if (!dia__read_files(bundle, json, error)) return 0;
+    if (!dia__read_self_test(bundle, json, test))
         return dia__fail(error, "manifest.json: the self-test is missing or not of this network's sizes");
     return 1;
 }

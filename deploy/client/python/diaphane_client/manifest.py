@@ -31,17 +31,15 @@ HEADS: Final[Mapping[str, tuple[tuple[str, ...], ...]]] = {
     "gain-curve": (("a", "b"), ("a", "b", "g")),
     "importance": (("importance",),),
 }
-"""What a network of each head may answer; the first is meant where a manifest does not say."""
+"""What a network of each head may answer."""
 
-_FORMATS: Final = ("diaphane-bundle/1", "diaphane-bundle/2")
-_ALWAYS: Final = frozenset(
+_FORMAT: Final = "diaphane-bundle/2"
+_KEYS: Final = frozenset(
     (
-        *("format", "name", "features", "hidden", "layers", "tail", "metric", "files"),
-        *("parity", "provenance", "evaluation"),
+        *("format", "name", "head", "outputs", "features", "hidden", "layers", "tail", "metric", "files"),
+        *("onnx", "self_test", "parity", "provenance", "evaluation"),
     )
 )
-_SECOND: Final = frozenset(("onnx", "self_test"))
-_KNOWN: Final = _ALWAYS | _SECOND | {"head", "outputs"}
 
 _FILE_NAME: Final = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
 _SHA256: Final = re.compile(r"[0-9a-f]{64}")
@@ -84,7 +82,7 @@ class Manifest:
         hidden: Units of each hidden layer (ReLU).
         tail: Name of the tail that has to be rendered, one with depth bins.
         files: Every other file.
-        self_test: Rows to check the network with; None in the first format.
+        self_test: Rows to check the network with.
     """
 
     head: str
@@ -93,7 +91,7 @@ class Manifest:
     hidden: tuple[int, ...]
     tail: str
     files: Mapping[str, FileRef]
-    self_test: SelfTest | None
+    self_test: SelfTest
 
     @property
     def layers(self) -> dict[str, tuple[int, ...]]:
@@ -135,16 +133,13 @@ def parse_files(listed: Mapping[str, Mapping[str, Any]]) -> dict[str, FileRef]:
 
 
 def _parsed(fields: Any) -> Manifest:
-    kind = fields["format"]
-    if kind not in _FORMATS:
-        raise ValueError(f"its format {kind!r} is not one of {', '.join(_FORMATS)}")
-    needed = _ALWAYS if kind == _FORMATS[0] else _ALWAYS | _SECOND
-    if missing := needed - fields.keys():
+    if fields["format"] != _FORMAT:
+        raise ValueError(f"its format {fields['format']!r} is not {_FORMAT}")
+    if missing := _KEYS - fields.keys():
         raise ValueError(f"{', '.join(sorted(missing))} is missing")
-    if unknown := fields.keys() - _KNOWN:
+    if unknown := fields.keys() - _KEYS:
         raise ValueError(f"{', '.join(sorted(unknown))} is unknown")
-    head = fields.get("head", "gain-curve")
-    outputs = tuple(fields.get("outputs", HEADS.get(head, ((),))[0]))
+    head, outputs = fields["head"], tuple(fields["outputs"])
     if outputs not in HEADS.get(head, ()):
         raise ValueError(f"a network of the head {head!r} does not answer {', '.join(map(str, outputs))}")
     features = tuple(
@@ -159,7 +154,7 @@ def _parsed(fields: Any) -> Manifest:
         hidden=_hidden(fields["hidden"]),
         tail=_tail(fields["tail"]),
         files=parse_files(fields["files"]),
-        self_test=_self_test(fields.get("self_test"), len(features), len(outputs)),
+        self_test=_self_test(fields["self_test"], len(features), len(outputs)),
     )
     if {each["name"]: tuple(each["shape"]) for each in fields["layers"]} != manifest.layers:
         raise ValueError("the layers do not follow from the features, the hidden units and the outputs")
@@ -189,9 +184,7 @@ def _hidden(units: Any) -> tuple[int, ...]:
     return tuple(units)
 
 
-def _self_test(fields: Any, inputs: int, outputs: int) -> SelfTest | None:
-    if fields is None:
-        return None
+def _self_test(fields: Any, inputs: int, outputs: int) -> SelfTest:
     found = SelfTest(fields["features"], fields["outputs"], fields["output_scale"])
     sizes = [(inputs, found.features), (outputs, found.outputs), (outputs, [found.scale])]
     if len(found.features) != len(found.outputs) or any(len(row) != size for size, rows in sizes for row in rows):

@@ -105,7 +105,7 @@ class Predictor:
 
     def _check(self) -> None:
         test = self.manifest.self_test
-        if test is None or not test.features:
+        if not test.features:
             return
         difference = self.network.answer(np.array(test.features)) - np.array(test.outputs)
         if not (np.abs(difference) <= SELF_TEST_TOLERANCE * np.array(test.scale)).all():
