@@ -27,24 +27,28 @@ from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.samples.glb import HOME
 from renderer.scene import load_scene
-from renderer.techniques import Budget, KBuffer, KBufferDeep, SBuffer, Technique, WeightedBlended
+from renderer.techniques import Binned, Budget, KBuffer, KBufferDeep, SBuffer, Technique, WeightedBlended
 from renderer.views import framing_view
 from schemas.bundle import MANIFEST, ParityReport, Provenance, TailSpec
 from schemas.colour import display8
-from schemas.tail import DEFAULT_TAIL, TAILS, TailName
+from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, TailName
 from services.dashboard import SESSION_ANSWERS, demo
 from services.dashboard.page import POLICY
 from trainer.bundle import Description, write_bundle
 
 SIZE = (480, 320)
 PIXELS = SIZE[0] * SIZE[1]
+MOST_BIN = 64
+"""Fragments that a bin of a pixel may have: what a budget may be left with."""
+SAME_K, SAME_COLOUR = 0.96, 0.997
+"""Shares of pixels with the renderer's k, and its colour, where bins are chosen. At the resolution that ranges of tiles
+are found at, rasterisers decide some silhouettes otherwise: then the bins of 64 pixels lie elsewhere."""
 GLB = HOME / "shells.glb"
 SIZED = """window.addEventListener('DOMContentLoaded', () => {
     const style = { boxSizing: 'content-box', width: '480px', height: '320px', aspectRatio: 'auto' };
     Object.assign(document.getElementById('stage')?.style ?? {}, style);
 })"""
-OTHER_TAILS = tuple(tail for tail in TAILS if tail != DEFAULT_TAIL)
-G = 1.25
+OTHER_TAILS = tuple(tail for tail in BINNED_TAILS if tail != DEFAULT_TAIL)
 AUDIT = Path(__file__).with_name("dashboard_audit.js").read_text(encoding="utf-8").rstrip("\n;")
 
 
@@ -60,8 +64,8 @@ def bundles(frame: Frame, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
     first = tmp_path_factory.mktemp("bundle")
     provenance = Provenance(scenes={}, code_version="0", seed=0, machine="test")
     described = Description("glass", TailSpec(name=DEFAULT_TAIL, g=0.75), "display", provenance, {})
-    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver="none")
-    features = derive(gather(capture(frame).dump, bins=16))
+    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, torch_ubo=0.0, driver="none")
+    features = derive(gather(capture(frame).dump, DEFAULT_TAIL))
     manifest = write_bundle(first, random_weights(11), described, features, lambda: parity)
     made = {"glass": first, "importance": tmp_path_factory.mktemp("importance")}
     importances = random_weights(11, head="importance", outputs=("importance",))
@@ -69,7 +73,7 @@ def bundles(frame: Frame, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
     for tail in OTHER_TAILS:
         made[tail] = tmp_path_factory.mktemp("bundles") / tail
         shutil.copytree(first, made[tail])
-        other = manifest.model_copy(update={"name": tail, "tail": TailSpec(name=tail, g=G)})
+        other = manifest.model_copy(update={"name": tail, "tail": TailSpec(name=tail, g=0.75)})
         (made[tail] / MANIFEST).write_text(other.model_dump_json(), encoding="utf-8")
     return made
 
@@ -137,8 +141,8 @@ def _shares(picture: NDArray[np.uint8], linear: NDArray[np.float32]) -> float:
 
 @pytest.mark.parametrize(
     ("technique", "factor"),
-    [(SBuffer(), 1.0), (WeightedBlended(), 1.0), (KBuffer(), 2.0)],
-    ids=["sbuffer", "weighted-blended", "kbuffer"],
+    [(SBuffer(), 1.0), (WeightedBlended(), 1.0), (Binned(), 1.0), (KBuffer(), 2.0)],
+    ids=["sbuffer", "weighted-blended", "binned", "kbuffer"],
 )
 def test_pictures_are_the_renderers(tab: Tab, frame: Frame, technique: Technique, factor: float) -> None:
     picture, _, _ = _pictured(tab, frame, technique.name, factor)
@@ -158,7 +162,7 @@ def test_half_floats_do_where_float32_is_not_blended(webgpu: Any, api: Api, url:
     )
     opened.page.goto("/demo")
     opened.page.locator("#figures tr").nth(1).wait_for()
-    for technique in (KBuffer(), WeightedBlended()):
+    for technique in (Binned(), KBuffer(), WeightedBlended()):
         picture, _, _ = _pictured(opened, frame, technique.name, 1.0)
         assert _shares(picture, technique.render(frame, Budget(PIXELS)).linear) >= 0.999
     assert opened.faults == []
@@ -166,7 +170,7 @@ def test_half_floats_do_where_float32_is_not_blended(webgpu: Any, api: Api, url:
 
 
 @pytest.mark.parametrize(("model", "factors"), [("glass@champion", (0.1, 0.5, 4.0)), ("importance@1.0.0", (0.5,))])
-def test_predicted_slots_use_the_budget_exactly(
+def test_predicted_cores_stay_within_the_budget(
     tab: Tab, frame: Frame, bundles: dict[str, Path], model: str, factors: tuple[float, ...]
 ) -> None:
     """From less than a slot for every occupied pixel to more than there are fragments."""
@@ -174,10 +178,11 @@ def test_predicted_slots_use_the_budget_exactly(
     deep = KBufferDeep(bundles[model.split("@")[0]])
     for factor in factors:
         picture, k, total = _pictured(tab, frame, "kbuffer-deep", factor)
-        expected = deep.render(frame, Budget(int(factor * PIXELS)))
-        assert k.sum() == min(int(factor * PIXELS), total)
-        assert np.mean(k == expected.k) > 0.98
-        assert _shares(picture, expected.linear) >= 0.999
+        expected = deep.render(frame, Budget(int(factor * PIXELS), tail=DEFAULT_TAIL))
+        budget = min(int(factor * PIXELS), total)
+        assert expected.k.sum() - MOST_BIN <= k.sum() <= budget
+        assert np.mean(k == expected.k) > SAME_K
+        assert _shares(picture, expected.linear) >= SAME_COLOUR
     _choose(tab, "glass@champion")
     assert tab.faults == []
 
@@ -208,12 +213,12 @@ def test_every_tail_of_a_bundle_is_rendered(tab: Tab, frame: Frame, bundles: dic
     _choose(tab, f"{tail}@1.0.0")
     picture, k, _ = _pictured(tab, frame, "kbuffer-deep", 0.5)
     deep = KBufferDeep(bundles[tail])
-    expected = deep.render(frame, Budget(PIXELS // 2, tail=tail, g=G))
-    assert k.sum() == PIXELS // 2
-    assert np.mean(k == expected.k) > 0.98
-    assert _shares(picture, expected.linear) >= 0.999
-    default = deep.render(frame, Budget(PIXELS // 2))
-    assert _shares(picture, default.linear) < _shares(picture, expected.linear) - 0.003
+    expected = deep.render(frame, Budget(PIXELS // 2, tail=tail))
+    assert expected.k.sum() - MOST_BIN <= k.sum() <= PIXELS // 2
+    assert np.mean(k == expected.k) > SAME_K
+    assert _shares(picture, expected.linear) >= SAME_COLOUR
+    default = KBufferDeep(bundles["glass"]).render(frame, Budget(PIXELS // 2, tail=DEFAULT_TAIL))
+    assert np.mean(k == default.k) < np.mean(k == expected.k) - 0.03
     _choose(tab, "glass@champion")
     assert tab.faults == []
 

@@ -47,7 +47,7 @@ def test_nothing_else_names_tails_features_or_constants(path: Path) -> None:
     text = written_by_hand(path)
     tails = [name for name in TAILS if f'"{name}"' in text]
     assert tails == []
-    assert [name for name in (*FEATURES, *SUMS) if f'"{name}"' in text] == []
+    assert [name for name in (*FEATURES, *SUMS) if len(name) > 1 and f'"{name}"' in text] == []
     numbers = {name: value for name, (value, _) in generate.CUTS.items()} | BIN_CONSTANTS
     for name, value in numbers.items():
         assert not re.search(rf"\b{name}\b\s*(:[^=\n]*)?=\s*[\d.]", text), name

@@ -17,6 +17,7 @@ import { Trouble } from "./trouble";
 
 const SAMPLES = { "glass shells": shells, "a shelf of bottles": shelf };
 const NAMES: Readonly<Record<Technique, string>> = {
+  binned: "binned: depth bins alone",
   "kbuffer-deep": "kbuffer-deep: predicted k",
   kbuffer: "kbuffer: fixed k",
   "weighted-blended": "weighted-blended",
@@ -150,7 +151,7 @@ function choose(stage: Stage, side: "left" | "right", technique: Technique): voi
     select(side),
     usable.map((each) => [each, NAMES[each]]),
   );
-  stage.wanted[side] = usable.includes(technique) ? technique : "kbuffer";
+  stage.wanted[side] = usable.includes(technique) ? technique : "binned";
   select(side).value = stage.wanted[side];
   at(`${side}-name`).textContent = stage.wanted[side];
   stage.draw();

@@ -44,12 +44,12 @@ export function parseManifest(content: string): Manifest {
   const unknown = Object.keys(fields).filter((name) => !NEEDED.includes(name));
   if (unknown.length) throw new Error(`${unknown.join(", ")} is unknown`);
   const { name, g } = object(fields["tail"]);
-  const tail = tailOf(String(name), number(g));
+  const tail = tailOf(String(name));
   const head = String(fields["head"]);
   if (!Object.hasOwn(OUTPUTS, head) || !OUTPUTS[head]!.includes(String(fields["outputs"]))) {
     throw new Error(`it has a head that is none, ${head} with ${fields["outputs"]}`);
   }
-  if (!tail || tail.g < 0) throw new Error(`it has a tail that is none, ${name}`);
+  if (!tail || number(g) < 0) throw new Error(`it has a tail without depth bins, or an unknown one, ${name}`);
   const features = list(fields["features"], MOST_FEATURES);
   for (const feature of features.map(object)) {
     if (typeof feature["name"] !== "string" || !(number(feature["std"]) > 0))

@@ -4,19 +4,21 @@ import type { Bundle } from "./bundle";
 import type { View } from "./camera";
 import type { Gpu } from "./gpu";
 import { Allocation, budgetOf } from "./passes/allocation";
+import { renderBinned } from "./passes/binned";
+import { type Binned, gatherBins } from "./passes/bins";
 import { renderBlended } from "./passes/blended";
 import { renderChain } from "./passes/chain";
+import { renderCore } from "./passes/core";
 import { renderExact } from "./passes/exact";
 import { Frame } from "./passes/frame";
 import { Geometry } from "./passes/geometry";
 import { predict } from "./passes/network";
-import { type Sums, gather } from "./passes/sums";
-import { CEILING, TURNS } from "./shaders";
-import { DEFAULT_TAIL, type Tail } from "./tail";
+import { TURNS } from "./shaders";
+import { DEFAULT_TAIL, FINEST_TAIL, type Tail } from "./tail";
 import { Trouble } from "./trouble";
 import { Work } from "./work";
 
-export const TECHNIQUES = ["kbuffer-deep", "kbuffer", "weighted-blended", "sbuffer"] as const;
+export const TECHNIQUES = ["binned", "kbuffer-deep", "kbuffer", "weighted-blended", "sbuffer"] as const;
 export type Technique = (typeof TECHNIQUES)[number];
 
 /** Linear grey behind everything. */
@@ -33,7 +35,7 @@ export class Renderer {
   readonly #allocation: Allocation;
   readonly #geometry: Geometry;
   #counted: Counted = { fragments: 0, occupied: 0 };
-  #sums: Sums | null = null;
+  #binned: Binned | null = null;
   #slots = 0;
 
   constructor(
@@ -67,18 +69,15 @@ export class Renderer {
   }
 
   /**
-   * Begins a view: the opaque surfaces, and how many transparent fragments there are.
+   * Begins a view: the opaque surfaces, how many transparent fragments there are, and where depth bins lie.
    *
    * @param work Nothing is pending in it.
    * @throws Trouble There is too much to draw.
    */
   async look(work: Work, view: View): Promise<Counted> {
-    this.#sums = null;
+    this.#binned = null;
     await this.frame.draw(work, view, this.#geometry.scene.bounds, CLEAR);
-    this.#allocation.count(work);
-    this.#allocation.begin(work, CEILING);
-    work.submit();
-    const [fragments, occupied, deepest] = await this.#allocation.totals();
+    const [fragments, occupied, deepest] = await this.#allocation.totals(work);
     if (deepest > TURNS) {
       const [found, most] = [deepest, TURNS].map((each) => each.toLocaleString("en"));
       throw new Trouble(
@@ -112,6 +111,7 @@ export class Renderer {
     const budget = budgetOf(factor, frame.pixels);
     // What a fixed k leaves empty is allocted, too; to kbuffer-deep more slots than fragments would be of no use.
     this.#slots = {
+      binned: 0,
       "kbuffer-deep": Math.min(budget, fragments),
       kbuffer: budget,
       "weighted-blended": 0,
@@ -119,46 +119,40 @@ export class Renderer {
     }[technique];
     if (technique === "sbuffer") await this.#renderExact(work, into);
     else if (technique === "weighted-blended") await renderBlended(frame, work, into);
-    else await this.#renderChain(work, technique, this.#slots, bundle, into);
+    else if (technique === "binned") await renderBinned(frame, work, await this.#gathered(work, FINEST_TAIL, false), into);
+    else if (technique === "kbuffer") await this.#renderFixed(work, this.#slots, into);
+    else await this.#renderDeep(work, this.#slots, bundle, into);
     work.submit();
     return into;
   }
 
   async #renderExact(work: Work, into: GPUBuffer): Promise<void> {
-    this.#allocation.begin(work, CEILING);
-    this.#allocation.place(work);
+    this.#allocation.placeAll(work);
     await renderExact(this.frame, work, this.#allocation.offsets, this.#counted.fragments, into);
   }
 
-  async #renderChain(
-    work: Work,
-    technique: "kbuffer" | "kbuffer-deep",
-    budget: number,
-    bundle: Bundle | null,
-    into: GPUBuffer,
-  ): Promise<void> {
-    const [frame, allocation] = [this.frame, this.#allocation];
-    allocation.begin(work, budget);
-    if (technique === "kbuffer") {
-      const sums = await this.#gathered(work, DEFAULT_TAIL, false);
-      allocation.placeFixed(work);
-      await renderChain(frame, work, allocation.offsets, budget, sums, into);
-      return;
-    }
-    if (!bundle) throw new Trouble("There is no bundle for kbuffer-deep.", "Choose a model.");
-    const sums = await this.#gathered(work, bundle.tail, true);
-    predict(frame, work, bundle, sums, allocation);
-    allocation.solve(work);
-    allocation.place(work);
-    await renderChain(frame, work, allocation.offsets, budget, sums, into);
+  async #renderFixed(work: Work, slots: number, into: GPUBuffer): Promise<void> {
+    const binned = await this.#gathered(work, DEFAULT_TAIL, false);
+    this.#allocation.placeFixed(work, slots);
+    await renderChain(this.frame, work, this.#allocation.offsets, slots, binned, into);
   }
 
-  /** What was gathered for a tail of as many bins serves this one. */
-  async #gathered(work: Work, tail: Tail, all: boolean): Promise<Sums> {
-    const before = this.#sums;
-    if (before && before.tail.bins === tail.bins && (!all || before.targets.length > 0)) return { ...before, tail };
-    this.#sums = null; // what there was is overwritten
-    this.#sums = await gather(this.frame, work, tail, all);
-    return this.#sums;
+  async #renderDeep(work: Work, budget: number, bundle: Bundle | null, into: GPUBuffer): Promise<void> {
+    if (!bundle) throw new Trouble("There is no bundle for kbuffer-deep.", "Choose a model.");
+    const [frame, allocation] = [this.frame, this.#allocation];
+    const binned = await this.#gathered(work, bundle.tail, true);
+    allocation.begin(work, binned, budget);
+    predict(frame, work, bundle, binned, allocation);
+    allocation.place(work, binned);
+    await renderCore(frame, work, binned, allocation, budget, into);
+  }
+
+  /** What was gathered for the same tail serves again. */
+  async #gathered(work: Work, tail: Tail, all: boolean): Promise<Binned> {
+    const before = this.#binned;
+    if (before && before.tail.name === tail.name && (!all || before.colours.length > 0)) return before;
+    this.#binned = null; // what there was is overwritten
+    this.#binned = await gatherBins(this.frame, work, tail, all);
+    return this.#binned;
   }
 }

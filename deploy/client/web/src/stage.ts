@@ -55,7 +55,7 @@ const MOST = 1600;
 const REST = 250;
 
 export class Stage {
-  readonly wanted: Wanted = { left: "kbuffer", right: "weighted-blended", mode: "picture", factor: 1, split: 0.5 };
+  readonly wanted: Wanted = { left: "binned", right: "weighted-blended", mode: "picture", factor: 1, split: 0.5 };
   bundle: Bundle | null = null;
   view: View | null = null;
   readonly #screen: Screen;

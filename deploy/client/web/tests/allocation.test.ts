@@ -1,9 +1,10 @@
 import { expect, it } from "vitest";
 
 import { blocksOf, budgetOf } from "../src/passes/allocation";
-import { runsOf } from "../src/passes/geometry";
-import { BLOCK, CEILING, EDGES, LAST, ROUNDS, gatheredWords, shader } from "../src/shaders";
-import { tailOf } from "../src/tail";
+import { runsOf, widened } from "../src/passes/geometry";
+import { CONSTANTS, TAILS } from "../src/generated";
+import { BLOCK, CEILING, shader } from "../src/shaders";
+import { DEFAULT_TAIL, FINEST_TAIL, tailOf } from "../src/tail";
 
 it("blocks hold every pixel and the offset behind the last one", () => {
   for (const pixels of [1, BLOCK - 1, BLOCK, BLOCK + 1, 480 * 320]) {
@@ -17,52 +18,27 @@ it("a budget is whole slots below where sums stop", () => {
   expect(budgetOf(1e9, 1e6)).toBe(CEILING - 1);
 });
 
-it("any price is found in the rounds that are run", () => {
-  // choose.wgsl: the budget lies between two edges, which are the next round's ends.
-  const edge = (low: number, high: number, j: number) =>
-    Math.min(low + Math.trunc((high - low + EDGES) / (EDGES + 1)) * (j + 1), high);
-  // begin.wgsl: around the last frame's answer, if there is one.
-  const first = (low: number, high: number, before: number | null) => (j: number) => {
-    if (before === null) return edge(low, high, j);
-    const from = Math.trunc(before / EDGES) * EDGES - (EDGES * EDGES) / 2;
-    return Math.min(Math.max(from + EDGES * j, -LAST), LAST);
-  };
-  const roundsFor = (wanted: number, before: number | null): number => {
-    let [low, high] = [-LAST, LAST];
-    let place = first(low, high, before);
-    let rounds = 0;
-    for (; high - low > 1; ++rounds) {
-      const edges = Array.from({ length: EDGES }, (_, j) => place(j));
-      const beyond = edges.find((each) => each > wanted);
-      low = edges.filter((each) => each <= wanted).at(-1) ?? low;
-      high = beyond ?? high;
-      place = (j) => edge(low, high, j);
-    }
-    expect([low - wanted, high - wanted]).toEqual([0, 1]);
-    return rounds;
-  };
-  const some = [-LAST, -LAST + 1, -1, 0, 1, 12345, LAST - 2, LAST - 1];
-  for (const wanted of some) {
-    for (const before of [null, ...some]) expect(roundsFor(wanted, before)).toBeLessThanOrEqual(ROUNDS);
-    expect(roundsFor(wanted, wanted)).toBe(2);
-    expect(roundsFor(12345, 12345 + 1900)).toBe(2);
+it("tails are those with bins, and their shaders have their constants", () => {
+  const binned = Object.keys(TAILS).filter((name) => tailOf(name) !== null);
+  expect(binned).toEqual(Object.keys(TAILS).filter((name) => TAILS[name]!.kind === "BINNED"));
+  for (const name of binned) {
+    const text = shader([], tailOf(name)!);
+    expect(text).toContain(`const BINS = ${TAILS[name]!.bins}u;`);
+    expect(text).toContain(`const MEAN_LEVELS = ${TAILS[name]!.meanLevels};`);
+    for (const [constant, value] of Object.entries(CONSTANTS)) expect(text).toContain(`const ${constant} = ${value};`);
   }
-});
-
-it("words a pixel are those of the shaders", () => {
-  expect([gatheredWords(16), gatheredWords(8), gatheredWords(0)]).toEqual([10, 6, 2]);
-  expect(shader(["depth_bins"], tailOf("density-8", 0)!)).toContain("const BINS = 8u;");
+  expect(tailOf("toString")).toBeNull();
+  expect(DEFAULT_TAIL.bins).toBeLessThan(FINEST_TAIL.bins);
   expect(() => shader(["nothing"])).toThrow();
 });
 
-it("every tail has shaders of its own, whatever its constant", () => {
-  for (const name of ["exact-coverage", "density", "weighted-average", "paper", "density-8", "density-16"]) {
-    const { bins } = tailOf(name, 1)!;
-    const text = shader([], tailOf(name, 1e300)!);
-    expect(text).toContain(`const TAIL = ${bins ? "BINNED" : name.toUpperCase().replace("-", "_")};`);
-    expect(text).toContain("const DENSITY_G = f32(1e+30);");
-  }
-  expect(tailOf("toString", 1)).toBeNull();
+it("a camera for whole tiles has the picture in its upper left", () => {
+  const block = new Float32Array(44);
+  for (const i of [0, 5, 15]) block[16 + i] = 1; // x, y and w as they are
+  const found = new Float32Array(widened(block.buffer, [0.5, 0.8]));
+  const clip = (x: number, y: number) => [0, 1].map((axis) => found[16 + axis]! * x + found[20 + axis]! * y + found[28 + axis]!);
+  expect(clip(-1, 1)).toEqual([-1, 1].map((each) => expect.closeTo(each)));
+  expect(clip(1, -1)).toEqual([0, -0.6].map((each) => expect.closeTo(each)));
 });
 
 it("triangles are drawn in runs that cover about as much, all of them once", () => {

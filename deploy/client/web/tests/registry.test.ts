@@ -119,8 +119,6 @@ describe("a manifest", () => {
     parseManifest(JSON.stringify({ ...manifestOf({ "predict.wgsl": file }), ...change }));
 
   it("is read", () => expect(parse({}).tail.bins).toBe(16));
-  it("may have a tail without bins", () =>
-    expect(parse({ tail: { name: "density", g: 1 } }).tail).toEqual({ name: "density", bins: 0, g: 1 }));
   it("may have a network of importances", () => {
     const self_test = { features: [[1]], outputs: [[0.5]], output_scale: [1], tolerance: {} };
     expect(parse({ head: "importance", outputs: ["importance"], self_test }).selfTest).toEqual(self_test);
@@ -130,8 +128,9 @@ describe("a manifest", () => {
     [{ parity: undefined }, "parity is missing"],
     [{ format: "diaphane-bundle/3" }, "format"],
     [{ tail: { name: "density-4", g: 1 } }, "density-4"],
-    [{ tail: { name: "density", g: -1 } }, "density"],
-    [{ tail: { name: "density" } }, "not finite"],
+    [{ tail: { name: "density", g: 1 } }, "a tail without depth bins"],
+    [{ tail: { name: "density-16", g: -1 } }, "density-16"],
+    [{ tail: { name: "density-16" } }, "not finite"],
     [{ head: "importance" }, "head"],
     [{ head: "toString" }, "head"],
     [{ features: [{ name: "log_n", mean: 0, std: 0 }] }, "spread"],

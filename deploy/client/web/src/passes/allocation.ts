@@ -1,17 +1,21 @@
-// Slots of every pixel (renderer/allocation/gpu.py): of predicted gain curves at the one price that uses a
-// budget, looked for around the last frame's; of a budget for everything, each pixel's n; or the same number everywhere.
+// Where each pixel's run of slots begins: whole bins of predicted gain curves at the one price that uses a budget
+// (renderer/allocation/gpu.py), every fragment, or the same number everywhere.
 
-import { BLOCK, CEILING, EDGES, ROUNDS, shader } from "../shaders";
+import { CONSTANTS } from "../generated";
+import { BLOCK, CEILING, shader } from "../shaders";
+import type { Tail } from "../tail";
 import type { Work } from "../work";
+import type { Binned } from "./bins";
 import type { Frame } from "./frame";
 
-/** Members of `State` in state.wgsl. */
-export const STATE_WORDS = 10 + EDGES;
+/** Members of `Cuts` in cut_state.wgsl. */
+const CUT_WORDS = 6;
+const HALVES = 2 ** Number(CONSTANTS["HALF_BITS"]);
 
 /** Blocks of the pixels and of the offset behind the last one. */
 export const blocksOf = (pixels: number): number => Math.floor(pixels / BLOCK) + 1;
 
-/** Slots that a technique may use: `factor` a pixel, at most N, within what sums hold. */
+/** Slots that a technique may use: `factor` a pixel, within what sums hold. */
 export function budgetOf(factor: number, pixels: number): number {
   return Math.min(Math.floor(factor * pixels), CEILING - 1);
 }
@@ -27,77 +31,87 @@ export class Allocation {
     this.#budget = frame.gpu.filled(new Uint32Array(4), GPUBufferUsage.UNIFORM);
   }
 
-  /** What was found; the next search begins there. */
-  get state(): GPUBuffer {
-    return this.#frame.words("state", STATE_WORDS);
-  }
-
-  /** N, pixels with fragments, and fragments of the fullest one; read back. */
-  async totals(): Promise<readonly [fragments: number, occupied: number, deepest: number]> {
-    const [fragments, occupied, deepest] = await this.#frame.gpu.read(this.state);
-    return [fragments!, occupied!, deepest!];
-  }
-
   /** Where each pixel's run of slots begins, and the end of the last one. */
   get offsets(): GPUBuffer {
     return this.#frame.words("offsets", this.#frame.pixels + 1);
   }
 
-  /** Of a predictor: a and 1 / b of every pixel. */
+  /** Bins of each pixel's core. */
+  get cuts(): GPUBuffer {
+    return this.#frame.words("cuts", this.#frame.pixels);
+  }
+
+  /** Of a predictor: a and b of every pixel. */
   get curves(): GPUBuffer {
     return this.#frame.words("curves", 2 * this.#frame.pixels);
   }
 
-  get #totals(): GPUBuffer {
-    return this.#frame.words("totals", 4 * this.#blocks);
+  /** What a predictor is told of the selection. */
+  get state(): GPUBuffer {
+    return this.#frame.words("cut state", CUT_WORDS);
   }
 
   get #sums(): GPUBuffer {
     return this.#frame.words("sums", 2 * this.#blocks);
   }
 
-  get #slots(): GPUBuffer {
-    return this.#frame.words("slots", this.#frame.pixels);
+  /** N, pixels with fragments, and fragments of the fullest one, of what was counted; read back. */
+  async totals(work: Work): Promise<readonly [fragments: number, occupied: number, deepest: number]> {
+    const found = this.#frame.words("counted", 3);
+    const blocks = this.#total(work);
+    this.#run(work, ["join"], "join", [blocks, found], 1);
+    work.submit();
+    const [fragments, occupied, deepest] = await this.#frame.gpu.read(found);
+    return [fragments!, occupied!, deepest!];
   }
 
-  /** Totals of what was counted; once a view. */
-  count(work: Work): void {
-    const { statistics } = this.#frame;
-    this.#run(work, ["state", "statistics", "totals"], "total_blocks", [statistics, this.#totals], this.#blocks);
+  /** A slot for every fragment. */
+  placeAll(work: Work): void {
+    this.#total(work);
+    this.#run(work, ["scan"], "scan", [this.#frame.words("total", 1), this.#sums], 1);
+    this.#run(work, ["place_all"], "place_all", [this.#frame.counts, this.#sums, this.offsets], this.#blocks);
   }
 
-  /** What there is to solve for a budget. The work has to be submitted before the next budget is begun. */
-  begin(work: Work, budget: number): void {
-    this.#frame.gpu.device.queue.writeBuffer(this.#budget, 0, new Uint32Array([Math.min(budget, CEILING - 1)]));
-    this.#run(work, ["state", "begin"], "begin", [this.#totals, this.state, this.#budget], 1);
-  }
-
-  /** Finds the price of the budget for the curves. */
-  solve(work: Work): void {
-    const counts = this.#frame.words("counts", EDGES * this.#blocks);
-    const inputs = [this.state, this.#frame.statistics, this.curves, counts];
-    const files = ["state", "statistics", "prices", "price_counts"];
-    for (let round = 0; round < ROUNDS; ++round) {
-      this.#run(work, files, "count_prices", inputs, this.#blocks);
-      this.#run(work, ["state", "choose"], "choose", [this.state, counts], 1);
-    }
-  }
-
-  /** Slots at the price that was found, or n where the budget covers everything; then their prefix sums. */
-  place(work: Work): void {
-    const { statistics } = this.#frame;
-    const found = [this.state, statistics, this.curves, this.#slots, this.#sums];
-    this.#run(work, ["state", "statistics", "prices", "slots"], "find_slots", found, this.#blocks);
-    this.#run(work, ["state", "scan"], "scan", [this.state, this.#sums], 1);
-    const placed = [this.state, this.#slots, this.#sums, this.offsets, this.#budget];
-    this.#run(work, ["state", "offsets"], "place_slots", placed, this.#blocks);
-  }
-
-  /** The same number of slots for every pixel of the window. */
-  placeFixed(work: Work): void {
+  /** The same number of slots for every pixel of the window. The work has to be submitted before the next budget. */
+  placeFixed(work: Work, budget: number): void {
+    this.#setBudget(budget);
     this.#frame.forPixels(work, ["fixed"], "place_fixed", [this.offsets, this.#budget], {
       threads: this.#frame.pixels + 1,
     });
+  }
+
+  /** Finds how many fragments can be in a core, and whether a budget covers them; as `placeFixed`. */
+  begin(work: Work, { tail, counts }: Binned, budget: number): void {
+    this.#setBudget(budget);
+    work.encoder.clearBuffer(this.state);
+    const files = ["cut_state", "cuts_of_counts", "core_totals"];
+    this.#run(work, files, "total_cores", [counts, this.state], this.#blocks, tail);
+    this.#run(work, ["cut_state", "begin_cuts"], "begin_cuts", [this.state, this.#budget], 1, tail);
+  }
+
+  /** Selects the price that uses the budget, and lays out the pool. */
+  place(work: Work, { tail, counts }: Binned): void {
+    const counted = this.#frame.zeros(work, "prices", HALVES);
+    const [state, curves, sums] = [this.state, this.curves, this.#sums];
+    for (const half of ["high", "low"]) {
+      const files = ["cut_state", "cuts_of_counts", "count_prices"];
+      this.#run(work, files, `count_${half}`, [counts, state, curves, counted], this.#blocks, tail);
+      this.#run(work, ["cut_state", "choose"], `choose_${half}`, [state, counted, this.#budget], 1, tail);
+    }
+    const found = [counts, state, curves, this.cuts, sums];
+    this.#run(work, ["cut_state", "cuts_of_counts", "find_cuts"], "find_cuts", found, this.#blocks, tail);
+    this.#run(work, ["scan"], "scan", [state, sums], 1);
+    this.#run(work, ["place_cuts"], "place_cuts", [state, this.cuts, sums, this.offsets, this.#budget], this.#blocks);
+  }
+
+  #setBudget(budget: number): void {
+    this.#frame.gpu.device.queue.writeBuffer(this.#budget, 0, new Uint32Array([Math.min(budget, CEILING - 1)]));
+  }
+
+  #total(work: Work): GPUBuffer {
+    const blocks = this.#frame.words("totals", 4 * this.#blocks);
+    this.#run(work, ["totals"], "total_blocks", [this.#frame.counts, blocks, this.#sums], this.#blocks);
+    return blocks;
   }
 
   #run(
@@ -106,7 +120,8 @@ export class Allocation {
     entryPoint: string,
     buffers: readonly GPUBuffer[],
     groups: number,
+    tail?: Tail,
   ): void {
-    this.#frame.dispatch(work, shader(files), entryPoint, buffers, [groups, 1]);
+    this.#frame.dispatch(work, shader(files, tail), entryPoint, buffers, [groups, 1]);
   }
 }

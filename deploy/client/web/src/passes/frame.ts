@@ -1,6 +1,7 @@
-// One view of a scene: the opaque background, n(p) and the depth range, and the buffers that the techniques share.
+// One view of a scene: the opaque background, n(p), the tiles' depth ranges, and the buffers that the techniques share.
 
 import { type Bounds, type View, cameraBlock } from "../camera";
+import { CONSTANTS } from "../generated";
 import { type Gpu, type Resource, groupsFor } from "../gpu";
 import { encodeGamma2 } from "../scene";
 import { shader } from "../shaders";
@@ -8,23 +9,31 @@ import { DEFAULT_TAIL } from "../tail";
 import type { Work } from "../work";
 import { BACKGROUND, DEPTH, type Geometry, type Pass } from "./geometry";
 
-const STATISTICS = 3;
+/** Side of the tiles, and pixels across one that its range is found from. */
+const TILE = Number(CONSTANTS["RANGE_TILE"]);
+const STEPS = 2;
 const TEXEL_BYTES: Partial<Record<GPUTextureFormat, number>> = {
   [BACKGROUND]: 4,
   [DEPTH]: 4,
+  r8unorm: 1,
   r16float: 2,
   r32float: 4,
   rgba16float: 8,
   rgba32float: 16,
 };
+const RANGE: Pass = { files: ["range"], entryPoint: "find_range", writes: [true] };
 const COUNT: Pass = { files: ["count"], entryPoint: "count_fragments", writes: [true] };
 
 export class Frame {
   readonly pixels: number;
   readonly background: GPUTexture;
   readonly depth: GPUTexture;
-  /** n, ~ of the least depth's bits, the greatest depth's bits of every pixel. */
-  readonly statistics: GPUBuffer;
+  /** [P], transparent fragments of every pixel. */
+  readonly counts: GPUBuffer;
+  /** [T], nearest depth and extent of every tile, between which its pixels' depth bins lie. */
+  readonly ranges: GPUBuffer;
+  readonly #grid: readonly [columns: number, rows: number];
+  readonly #gridBlock: GPUBuffer;
   readonly #buffers = new Map<string, GPUBuffer>();
   readonly #targets = new Map<string, GPUTexture>();
 
@@ -37,14 +46,17 @@ export class Frame {
     this.pixels = width * height;
     this.background = this.target("background", BACKGROUND);
     this.depth = this.target("depth", DEPTH);
-    this.statistics = this.words("statistics", STATISTICS * this.pixels);
+    this.counts = this.words("n", this.pixels);
+    this.#grid = [Math.ceil(width / TILE), Math.ceil(height / TILE)];
+    this.#gridBlock = gpu.filled(new Uint32Array([...this.#grid, 0, 0]), GPUBufferUsage.UNIFORM);
+    this.ranges = this.words("ranges", 2 * this.#grid[0] * this.#grid[1]);
   }
 
   /** Bytes of all buffers and textures that there are by now. */
   get bytes(): number {
     const buffers = [...this.#buffers.values()].reduce((sum, { size }) => sum + size, 0);
-    const targets = [...this.#targets.values()].reduce((sum, { format }) => sum + TEXEL_BYTES[format]!, 0);
-    return buffers + targets * this.pixels;
+    const targets = [...this.#targets.values()];
+    return targets.reduce((sum, { format, width, height }) => sum + TEXEL_BYTES[format]! * width * height, buffers);
   }
 
   /** Gives back all buffers and textures. */
@@ -75,13 +87,13 @@ export class Frame {
     return this.words(name, Math.max(count, (this.#buffers.get(name)?.size ?? 0) / 4));
   }
 
-  /** A texture of the frame's size that is kept under a name and its format. */
-  target(name: string, format: GPUTextureFormat): GPUTexture {
+  /** A texture, of the frame's size if none is given, that is kept under a name and its format. */
+  target(name: string, format: GPUTextureFormat, size = [this.width, this.height]): GPUTexture {
     const key = `${name} ${format}`;
     let texture = this.#targets.get(key);
     if (!texture) {
       const usage = GPUTextureUsage.RENDER_ATTACHMENT | GPUTextureUsage.TEXTURE_BINDING;
-      texture = this.gpu.device.createTexture({ size: [this.width, this.height], format, usage });
+      texture = this.gpu.device.createTexture({ size, format, usage });
       this.#targets.set(key, texture);
     }
     return texture;
@@ -115,17 +127,28 @@ export class Frame {
   }
 
   /**
-   * Draws the opaque surfaces and counts the transparent fragments of a view.
+   * Draws the opaque surfaces, counts the transparent fragments, and finds the tiles' ranges of a view.
    *
    * @param clear Linear grey behind everything.
    * @throws Trouble There is too much to draw.
    */
   async draw(work: Work, view: View, bounds: Bounds, clear: number): Promise<void> {
     const { geometry, width, height } = this;
-    await geometry.look(cameraBlock(view, bounds, geometry.scene.up, width, height), this.pixels);
+    const [columns, rows] = this.#grid;
+    const block = cameraBlock(view, bounds, geometry.scene.up, width, height);
+    await geometry.look(block, [width / (columns * TILE), height / (rows * TILE)], this.pixels);
     const grey = encodeGamma2(clear) / 255;
     await geometry.drawOpaque(work, this.background, this.depth, [grey, grey, grey, 1]);
-    work.encoder.clearBuffer(this.statistics);
-    await geometry.drawTransparent(work, COUNT, this.depth, [this.statistics]);
+    work.encoder.clearBuffer(this.counts);
+    await geometry.drawTransparent(work, COUNT, this.depth, [this.counts]);
+    const found = this.zeros(work, "found ranges", 2 * columns * rows);
+    await geometry.drawCoarse(work, RANGE, this.#coarse(), found);
+    this.dispatch(work, shader(["fill_ranges"]), "fill_ranges", [found, this.ranges, this.#gridBlock], [1, 1]);
+  }
+
+  /** What is drawn into at a fraction of the resolution: a pass needs a target. Whole tiles, also beyond the picture. */
+  #coarse(): GPUTexture {
+    const size = this.#grid.map((tiles) => tiles * STEPS);
+    return this.target("coarse", "r8unorm", size);
   }
 }

@@ -27,6 +27,10 @@ const BLEND: GPUBlendState = {
   alpha: { srcFactor: "one", dstFactor: "one", operation: "add" },
 };
 
+const CAMERA_BYTES = 176;
+/** Where in it the projection is, column by column. */
+const PROJECTION = 16;
+
 /** A pass over the transparent triangles. */
 export interface Pass {
   /** Files of `shaders/` in front of `surface` and after it; the last one has the entry point. */
@@ -57,6 +61,8 @@ interface Drawn {
 
 export class Geometry {
   readonly #camera: GPUBuffer;
+  /** The same view at a fraction of the resolution. */
+  readonly #coarseCamera: GPUBuffer;
   readonly #buffers: GPUBuffer[];
   readonly #indices: GPUBuffer;
   readonly #textures: GPUTexture[];
@@ -78,7 +84,8 @@ export class Geometry {
       ...[normals, uvs, colours].map((data) => gpu.filled(data, VERTEX)),
     ];
     this.#indices = gpu.filled(scene.indices, INDEX | STORAGE);
-    this.#camera = gpu.filled(new Uint8Array(176), UNIFORM);
+    this.#camera = gpu.filled(new Uint8Array(CAMERA_BYTES), UNIFORM);
+    this.#coarseCamera = gpu.filled(new Uint8Array(CAMERA_BYTES), UNIFORM);
     const both = GPUShaderStage.VERTEX | GPUShaderStage.FRAGMENT;
     const visibility = GPUShaderStage.FRAGMENT;
     const camera: GPUBindGroupLayoutEntry = { binding: 0, visibility: both, buffer: { type: "uniform" } };
@@ -105,7 +112,8 @@ export class Geometry {
 
   /** Gives back what the scene takes. */
   destroy(): void {
-    for (const each of [...this.#buffers, this.#indices, this.#camera, ...this.#textures]) each.destroy();
+    const own = [...this.#buffers, this.#indices, this.#camera, this.#coarseCamera, ...this.#textures];
+    for (const each of own) each.destroy();
   }
 
   /** Whether drawing this view once takes so long that there are pauses. */
@@ -117,11 +125,13 @@ export class Geometry {
    * Moves the camera, and looks how much there is to draw from there.
    *
    * @param block Of `cameraBlock`.
+   * @param share Width and height of the picture as shares of what `drawCoarse` draws.
    * @param pixels Of the window.
    * @throws Trouble It is too much for a page that has to stay usable.
    */
-  async look(block: ArrayBuffer, pixels: number): Promise<void> {
+  async look(block: ArrayBuffer, share: readonly [number, number], pixels: number): Promise<void> {
     this.gpu.device.queue.writeBuffer(this.#camera, 0, block);
+    this.gpu.device.queue.writeBuffer(this.#coarseCamera, 0, widened(block, share));
     const areas = await this.#areas();
     const sum = areas.reduce((one, two) => one + two, 0);
     const covered = Number.isNaN(sum) ? Infinity : sum;
@@ -187,6 +197,28 @@ export class Geometry {
       pass.setPipeline(pipeline);
       pass.setBindGroup(0, this.#group(this.#layouts.frame, [this.#camera, depth.createView()]));
       pass.setBindGroup(2, this.#group(pipeline.getBindGroupLayout(2), buffers));
+      return pass;
+    });
+  }
+
+  /**
+   * Runs a pass over the transparent triangles at a fraction of the resolution, also those that something hides.
+   *
+   * @param target What is drawn into: nothing is.
+   * @param buffer The one storage buffer.
+   */
+  async drawCoarse(work: Work, what: Pass, target: GPUTexture, buffer: GPUBuffer): Promise<void> {
+    const pipeline = this.#pipeline(shader(["camera", "surface", ...what.files]), what.entryPoint, () => ({
+      layout: [this.#layouts.camera, this.#layouts.look, this.#storage(what.writes)],
+      targets: [{ format: target.format, writeMask: 0 }],
+    }));
+    await this.#draw(work, ["mixed", "transparent"], (loadOp) => {
+      const pass = work.encoder.beginRenderPass({
+        colorAttachments: [{ view: target.createView(), loadOp, storeOp: "discard" }],
+      });
+      pass.setPipeline(pipeline);
+      pass.setBindGroup(0, this.#group(this.#layouts.camera, [this.#coarseCamera]));
+      pass.setBindGroup(2, this.#group(pipeline.getBindGroupLayout(2), [buffer]));
       return pass;
     });
   }
@@ -265,7 +297,7 @@ export class Geometry {
     describe: () => {
       layout: GPUBindGroupLayout[];
       targets: GPUColorTargetState[];
-      depth: GPUDepthStencilState;
+      depth?: GPUDepthStencilState;
     },
   ): GPURenderPipeline {
     const key = `${entryPoint}\n${code}`;
@@ -280,12 +312,24 @@ export class Geometry {
         vertex: { module, entryPoint: "place", buffers: VERTEX_BUFFERS },
         fragment: { module, entryPoint, targets },
         primitive: { topology: "triangle-list", cullMode: "none" },
-        depthStencil: depth,
+        ...(depth && { depthStencil: depth }),
       });
       this.#pipelines.set(key, made);
     }
     return made;
   }
+}
+
+/** A camera whose target reaches beyond the picture at its right and lower edge; the size stays the picture's. */
+export function widened(block: ArrayBuffer, [across, down]: readonly [number, number]): ArrayBuffer {
+  const floats = new Float32Array(block.slice(0));
+  for (let column = 0; column < 4; ++column) {
+    const at = PROJECTION + 4 * column;
+    const w = floats[at + 3]!;
+    floats[at] = across * floats[at]! + (across - 1) * w;
+    floats[at + 1] = down * floats[at + 1]! + (1 - down) * w; // clip space has y upwards, and row 0 is above
+  }
+  return floats.buffer;
 }
 
 /** All indices, cut where `MOST_AT_ONCE` pixels are covered; a group of triangles stays whole. */

@@ -6,19 +6,19 @@ import { shader } from "../shaders";
 import { Trouble } from "../trouble";
 import type { Work } from "../work";
 import type { Allocation } from "./allocation";
+import type { Binned } from "./bins";
 import type { Frame } from "./frame";
-import type { Sums } from "./sums";
 
 /** The network's text; one number is answered as a scalar, which a shader turns into the vector that it expects. */
 const textOf = ({ wgsl, selfTest }: Bundle): string =>
   `${wgsl}\nalias Answer = vec${Math.max(selfTest.outputs[0]!.length, 2)}f;`;
 
-const FILES = ["state", "statistics", "depth_bins", "curves"];
+const FILES = ["cut_state", "cuts_of_counts", "bins", "kept_bins", "curves"];
 
-/** Predicts a and 1 / b of every pixel that has a choice, into the allocation's curves. */
-export function predict(frame: Frame, work: Work, bundle: Bundle, sums: Sums, into: Allocation): void {
-  const textures = [frame.background, ...sums.targets].map((texture) => texture.createView());
-  const buffers = [into.state, frame.statistics, sums.gathered, into.curves];
+/** Predicts a and b of every occupied pixel, into the allocation's curves. */
+export function predict(frame: Frame, work: Work, bundle: Bundle, binned: Binned, into: Allocation): void {
+  const textures = [frame.background, ...binned.colours].map((texture) => texture.createView());
+  const buffers = [binned.counts, into.state, binned.bins, frame.ranges, into.curves];
   const options = { tail: bundle.tail, before: textOf(bundle) };
   frame.forPixels(work, FILES, "predict_curves", [...buffers, ...textures], options);
 }

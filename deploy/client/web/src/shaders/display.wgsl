@@ -20,3 +20,12 @@ fn behind(word: u32, light: vec4f) -> vec4f {
     let a = f32(word >> 24u) / 255.0;
     return vec4f(light.rgb + light.a * a * decoded(word), light.a * (1.0 - a));
 }
+
+// The mean of a tail's sums over the background as it is stored, by what the tail lets through.
+fn tail_over(sums: vec4f, depth: f32, root: vec3f) -> vec3f {
+    if (sums.a == 0.0) {
+        return root * root;
+    }
+    let through = exp(-depth);
+    return (1.0 - through) * (sums.rgb / sums.a) + through * root * root;
+}

@@ -1,28 +1,29 @@
-// The gathered depth bins of every pixel, packed in place (renderer/shaders/gather/pack.comp).
-@group(0) @binding(0) var<storage, read_write> gathered: array<u32>;  // [P][GATHERED]
+// What is kept of every pixel's gathered depth bins, in their place (renderer/shaders/gather/pack.comp): of bin b the
+// share of optical depth in front of the next one, times 256, and its mean position; of the last one D in units.
+@group(0) @binding(0) var<storage, read_write> bins: array<u32>;  // [P][BINS]
+
+fn level(part: u32, whole: u32, levels: u32) -> u32 {
+    return select(min((2u * levels * part + whole) / max(2u * whole, 1u), levels), 0u, whole == 0u);
+}
 
 @compute @workgroup_size(64)
 fn pack_bins(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
-    let p = thread_of(id, groups);
-    let at = GATHERED * p;
-    if (at + GATHERED > arrayLength(&gathered)) {
+    let at = BINS * thread_of(id, groups);
+    if (at + BINS > arrayLength(&bins)) {
         return;
     }
-    var front: array<u32, BINS + 1u>;
+    var total = 0u;
     for (var b = 0u; b < BINS; b++) {
-        front[b + 1u] = front[b] + ((gathered[at + 2u + b / 2u] >> (16u * (b & 1u))) & BIN_LIMIT);
+        total += bins[at + b] >> 16u;
     }
-    let total = front[BINS];
-    gathered[at] = bitcast<u32>(f32(gathered[at]) / OPTICAL_ONE);
-    for (var w = 0u; w < BINS / 8u; w++) {
-        var word = 0u;
-        for (var j = 0u; j < 8u; j++) {
-            let b = 8u * w + j + 1u;
-            if (b == BINS || total == 0u) {
-                break;
-            }
-            word |= ((2u * SHARE_LEVELS * front[b] + total) / (2u * total)) << (4u * j);  // to the nearest step
+    var front = 0u;
+    for (var b = 0u; b < BINS; b++) {
+        let own = bins[at + b] >> 16u;
+        front += own;
+        var word = level(front, total, SHARE_LEVELS) << 8u;
+        if (MEAN_LEVELS > 0) {
+            word |= level(bins[at + b] & BIN_LIMIT, own, MEAN_LEVELS);
         }
-        gathered[at + 2u + w] = word;
+        bins[at + b] = select(word, min(total, BIN_LIMIT), b == BINS - 1u);
     }
 }

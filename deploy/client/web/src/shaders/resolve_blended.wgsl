@@ -10,12 +10,5 @@ fn resolve_blended(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgr
     if (p >= arrayLength(&shown)) {
         return;
     }
-    let root = texel_of(background, p).rgb;
-    let sum = texel_of(sums, p);
-    var colour = root * root;
-    if (sum.a > 0.0) {
-        let through = exp(-texel_of(depths, p).r);
-        colour = (1.0 - through) * (sum.rgb / sum.a) + through * colour;
-    }
-    shown[p] = display_word(colour, 0u);
+    shown[p] = display_word(tail_over(texel_of(sums, p), texel_of(depths, p).r, texel_of(background, p).rgb), 0u);
 }

@@ -1,27 +1,10 @@
-// Core front to back, then the tail, then the background (renderer/shaders/kbuffer/resolve.frag).
+// Slots front to back, then the tail, then the background (renderer/shaders/kbuffer/resolve.frag).
 @group(0) @binding(0) var<storage, read> offsets: array<u32>;          // [P + 1]
 @group(0) @binding(1) var<storage, read> colours: array<u32>;          // ~ of packed colours; 0: an empty slot
-@group(0) @binding(2) var<storage, read> statistics: array<Statistics>;
-@group(0) @binding(3) var<storage, read> gathered: array<u32>;         // [P][GATHERED]; the first is D
-@group(0) @binding(4) var background: texture_2d<f32>;                 // gamma-2 encoded
-@group(0) @binding(5) var tail: texture_2d<f32>;                       // sum w C, sum w
-@group(0) @binding(6) var<storage, read_write> shown: array<u32>;      // [P]
-
-// Colour of tail and background behind the core, all of it premultiplied by what the core lets through.
-fn behind_core(p: u32, k: u32, core: f32, sums: vec4f, background: vec3f) -> vec3f {
-    if (sums.a == 0.0) {
-        return core * background;
-    }
-    let average = sums.rgb / sums.a;
-    if (TAIL == PAPER || TAIL == WEIGHTED_AVERAGE) {  // w = a, so its sum is A: P = (1 - A / t)^t
-        let t = f32(statistics[p].n - k);
-        let through = pow(max(1.0 - sums.a / t, 0.0), t);
-        let share = select(1.0 - through, 1.0, TAIL == PAPER);
-        return core * (share * average + through * background);
-    }
-    let through = min(exp(-bitcast<f32>(gathered[GATHERED * p])), core);  // the whole list lets exp(-D) through
-    return (core - through) * average + through * background;
-}
+@group(0) @binding(2) var background: texture_2d<f32>;                 // gamma-2 encoded
+@group(0) @binding(3) var sums: texture_2d<f32>;                       // sum w C, sum w
+@group(0) @binding(4) var depths: texture_2d<f32>;                     // sum -ln(1 - a)
+@group(0) @binding(5) var<storage, read_write> shown: array<u32>;      // [P]
 
 @compute @workgroup_size(64)
 fn resolve_chain(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
@@ -38,7 +21,6 @@ fn resolve_chain(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
         light = behind(~colours[i], light);
         k++;
     }
-    let root = texel_of(background, p).rgb;
-    let rest = behind_core(p, k, light.a, texel_of(tail, p), root * root);
-    shown[p] = display_word(light.rgb + rest, k);
+    let rest = tail_over(texel_of(sums, p), texel_of(depths, p).r, texel_of(background, p).rgb);
+    shown[p] = display_word(light.rgb + light.a * rest, k);
 }

@@ -1,7 +1,10 @@
-// Exclusive prefix sums over the blocks, in place. One work group: each thread has a run of them.
-@group(0) @binding(0) var<storage, read_write> state: State;
+// Exclusive prefix sums over the blocks, in place. One work group: each thread has a run of them. Sums stop at CEILING,
+// so that they are the same in any order.
+@group(0) @binding(0) var<storage, read_write> total: array<u32>;   // its last word gets the sum of the first column
 @group(0) @binding(1) var<storage, read_write> sums: array<vec2u>;  // [blocks]
 var<workgroup> part: array<vec2u, 256>;
+
+const CEILING = vec2u(0x7fffffffu);
 
 @compute @workgroup_size(256)
 fn scan(@builtin(local_invocation_index) lane: u32) {
@@ -11,7 +14,7 @@ fn scan(@builtin(local_invocation_index) lane: u32) {
     let end = min(first + run, blocks);
     var own = vec2u(0u);
     for (var i = first; i < end; i++) {
-        own = add2(own, sums[i]);
+        own = min(own + sums[i], CEILING);
     }
     part[lane] = own;
     workgroupBarrier();
@@ -20,15 +23,15 @@ fn scan(@builtin(local_invocation_index) lane: u32) {
         for (var i = 0u; i < 256u; i++) {
             let here = part[i];
             part[i] = before;
-            before = add2(before, here);
+            before = min(before + here, CEILING);
         }
-        state.sure = before.x;
+        total[arrayLength(&total) - 1u] = before.x;
     }
     workgroupBarrier();
     var before = part[lane];
     for (var i = first; i < end; i++) {
         let here = sums[i];
         sums[i] = before;
-        before = add2(before, here);
+        before = min(before + here, CEILING);
     }
 }

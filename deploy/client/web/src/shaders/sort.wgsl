@@ -1,6 +1,7 @@
 // Sorts each pixel's run by depth, then packed colour: heapsort, in place.
 @group(0) @binding(0) var<storage, read> offsets: array<u32>;        // [P + 1]
-@group(0) @binding(1) var<storage, read_write> pool: array<vec2u>;   // packed colour, depth bits
+@group(0) @binding(1) var<storage, read> cursors: array<u32>;        // [P], fragments captured
+@group(0) @binding(2) var<storage, read_write> pool: array<vec2u>;   // packed colour, depth bits
 
 fn comes_before(one: vec2u, two: vec2u) -> bool {
     return one.y < two.y || (one.y == two.y && one.x < two.x);
@@ -33,7 +34,7 @@ fn sort_runs(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) 
         return;
     }
     let base = offsets[p];
-    let n = offsets[p + 1u] - base;
+    let n = min(cursors[p], offsets[p + 1u] - base);
     for (var i = n / 2u; i > 0u; i--) {
         sift(base, n, i - 1u, pool[base + i - 1u]);
     }
