@@ -84,8 +84,8 @@ def importance_curve(importance: NDArray[np.floating]) -> tuple[NDArray[np.float
     """
     # Of NaN and another number, fmax is the other.
     weight = np.fmax(np.asarray(importance, dtype=np.float32), np.float32(1.0 / MOST_FALL))
-    fall = np.float32(1.0) / weight
-    return np.maximum(np.float32(-1.5) * fall, np.float32(-MOST_GAIN)), fall
+    fall = np.asarray(np.float32(1.0) / weight, dtype=np.float32)
+    return np.asarray(np.maximum(np.float32(-1.5) * fall, np.float32(-MOST_GAIN)), dtype=np.float32), fall
 
 
 def _within_limits(
