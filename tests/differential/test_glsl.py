@@ -25,6 +25,8 @@ from renderer.hidden import hidden_fragments
 from renderer.programs import SHADERS, Defines, expand
 from renderer.techniques import TECHNIQUES, Budget, KBufferDeep, Needs, technique
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, MAX_EXPONENT, NO_TAIL, TAIL_NAMES, TAILS, TailKind
+from services.stress.gl_stacks import VIEW as STACKS
+from services.stress.gl_stacks import extreme_stacks, size, stack_scene
 
 STAGES = (".vert", ".frag", ".comp")
 FULLSCREEN = ("common/fullscreen.vert", "benchmark/empty.frag")
@@ -50,6 +52,8 @@ def compiled(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> 
         frame = Frame(GpuScene(gl, shells(subdivisions=1)), VIEW, 32, 24)
         dump = capture(frame).dump
         hidden_fragments(frame)
+        stacks = extreme_stacks(300)  # runs that one thread does not sort
+        technique("sbuffer").render(Frame(GpuScene(gl, stack_scene(stacks)), STACKS, *size(len(stacks))), Budget(1))
         bundle = tmp_path_factory.mktemp("bundle")
         features = derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0]
         export_random(bundle, random_weights(4), features, gl)

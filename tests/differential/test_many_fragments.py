@@ -12,6 +12,7 @@ import pytest
 from support.training import random_weights
 
 from labeller.curves import composite
+from renderer.allocation.cuts import FULL, MOST_CORE, usable_counts
 from renderer.capture import capture
 from renderer.features import FEATURES, derive, gather
 from renderer.frame import Frame
@@ -21,12 +22,13 @@ from renderer.techniques import TECHNIQUES, Adaptive, Budget, Multilayer, Needs,
 from renderer.techniques.ordered import capture_ordered
 from schemas.bundle import Provenance, TailSpec
 from schemas.fragments import FragmentDump
-from schemas.tail import DEFAULT_TAIL, TAILS, TailName
+from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, TAILS, TailName
 from services.stress.gl_stacks import STRIDE, VIEW, extreme_stacks, size, stack_scene
 from trainer.bundle import Description, export_bundle
 
 LAYERS = 4096
 FEWER_LAYERS = 96
+PREDICTED = ("kbuffer-deep", "kbuffer-temporal")
 PASSES_GROW_WITH_LAYERS = ("depth-peeling", "dual-depth-peeling")
 BOUND = 1e-5
 """Linear. 1 - 1/255 is rounded once and multiplied hundreds of times before the product is small: 4e-6 is usual."""
@@ -67,16 +69,16 @@ def needs(case: Case, gl: moderngl.Context, tmp_path_factory: pytest.TempPathFac
     )
 
 
-def make_bundle(dump: FragmentDump, gl: moderngl.Context, folder: Path) -> Path:
+def make_bundle(dump: FragmentDump, gl: moderngl.Context, folder: Path, tail: TailName = DEFAULT_TAIL) -> Path:
     description = Description(
         name="random",
-        tail=TailSpec(name=DEFAULT_TAIL, g=0.75),
+        tail=TailSpec(name=tail, g=0.75),
         metric="display",
         provenance=Provenance(scenes={}, code_version="0", seed=0, machine="test"),
         evaluation={},
     )
     export_bundle(
-        folder, random_weights(11, FEATURES, (8,)), description, derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0], gl
+        folder, random_weights(11, FEATURES, (8,)), description, derive(gather(dump, tail))[dump.counts > 0], gl
     )
     return folder
 
@@ -109,11 +111,33 @@ def test_exact_techniques_stay_exact__name(case: Case, lower_case: Case, needs: 
 
 
 @pytest.mark.parametrize("tail", TAILS)
-@pytest.mark.parametrize("name", family("bounded"))
+@pytest.mark.parametrize("name", [name for name in family("bounded") if name not in PREDICTED])
 def test_bounded_techniques_are_as_simulated__name_tail(case: Case, needs: Needs, name: str, tail: TailName) -> None:
     rendered = render(case, name, needs, tail)
     assert 0 < rendered.captured < case.dump.total
     np.testing.assert_allclose(rendered.linear, case.picture(rendered.k, tail), atol=BOUND, rtol=0)
+
+
+@pytest.mark.parametrize("layers", [FEWER_LAYERS, 300, 1500, LAYERS])
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+@pytest.mark.parametrize("name", PREDICTED)
+def test_predicted_cores_are_bins_of_fewer_than_255_and_1023_in_all__name_tail_layers(
+    gl: moderngl.Context, tmp_path: Path, name: str, tail: TailName, layers: int
+) -> None:
+    """Thousands of fragments in every bin leave a pixel to its tail, and the picture is as simulated all the same."""
+    case = make_case(gl, layers)
+    needs = Needs(bundle=make_bundle(case.dump, gl, tmp_path, tail))
+    counts = case.frame.gather_bins(tail, counts=True).counts
+    assert counts is not None
+    by_bin = np.frombuffer(counts.read(), dtype=np.uint8).reshape(case.frame.pixels, -1)
+    usable = usable_counts(by_bin)
+    assert (by_bin == FULL).any() == (layers > FEWER_LAYERS)
+    for fragments in (0, int(usable.sum()) // 3, case.dump.total - 1, 2 * case.dump.total):
+        rendered = technique(name, needs).render(case.frame, Budget(fragments, tail))
+        assert rendered.captured <= min(fragments, int(usable.sum()))
+        assert rendered.captured == usable.sum() or fragments < usable.sum()
+        assert rendered.k.max() <= MOST_CORE
+        np.testing.assert_allclose(rendered.linear, case.picture(rendered.k, tail), atol=BOUND, rtol=0)
 
 
 @pytest.mark.parametrize("name", family("approximate"))

@@ -22,6 +22,7 @@ from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.techniques import TECHNIQUES, Budget, Needs, technique
 from schemas.colour import display8
+from schemas.tail import DEFAULT_TAIL
 
 FOLDER = Path(__file__).parent
 DRIVER = FOLDER / "driver.json"
@@ -38,7 +39,7 @@ def needs(frame: Frame, gl: moderngl.Context, tmp_path_factory: pytest.TempPathF
     """A network of random weights, and an allocation that depends on nothing but the counts."""
     folder = tmp_path_factory.mktemp("bundle")
     dump = capture(frame).dump
-    export_random(folder, random_weights(11), derive(gather(dump))[dump.counts > 0], gl)
+    export_random(folder, random_weights(11), derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0], gl)
     return Needs(bundle=folder, allocate=lambda frame, _: (frame.count() // 2).astype(np.int32))
 
 
