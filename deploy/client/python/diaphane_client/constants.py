@@ -10,11 +10,11 @@ HALF_BITS: Final = 11
 """Of a price's rank: two counts of 2^HALF_BITS find it."""
 DROPPED_BITS: Final = 10
 """Lowest bits of float32 that a price's rank does without."""
-MOST_GAIN: Final = 1.152921504606847e+18
+MOST_GAIN: Final = 1.152921504606847e18
 """Curves are clamped to this |a|,"""
 LEAST_FALL: Final = 0.000244140625
 """to b at least this,"""
-MOST_FALL: Final = 1.152921504606847e+18
+MOST_FALL: Final = 1.152921504606847e18
 """and to b at most this."""
 MOST_BINS: Final = 16
 """Of any tail."""
