@@ -58,6 +58,13 @@ _QUICK = {"sizes": ((320, 214),), "alphas": (0.33,), "scenes": ("sponza", "bottl
 def main() -> int:
     """Measures what is missing, then writes results, figures and the page."""
     arguments = _parse()
+    if arguments.page_only:
+        text, drawn = published()
+        PAGE.write_text(text, encoding="utf-8")
+        for file, svg in drawn.items():
+            (PAGE.parent / file).write_text(svg + "\n", encoding="utf-8")
+        print(PAGE)
+        return 0
     progress = make_progress(sys.stderr)
     work = arguments.work / ("quick" if arguments.quick else label())
     _begin(work, arguments.fresh, with_committed=not arguments.quick)
@@ -68,7 +75,7 @@ def main() -> int:
         if absent := {*SHARED} & (only or {*SHARED}) - {case.scene for case in cases}:
             progress.note(f"{', '.join(sorted(absent))}: not in {arguments.scenes}, left out")
         parts = list(parts_of(cases, arguments.alphas, arguments.sizes))
-        for number, part in enumerate(parts if not arguments.page_only else ()):
+        for number, part in enumerate(parts):
             start = time.perf_counter()
             left_out += bench(_options(part, arguments, work), COMMAND, progress).left_out
             _tell(progress, part, number, len(parts), time.perf_counter() - start)
@@ -179,7 +186,9 @@ def _parse() -> argparse.Namespace:
     parser.add_argument("--work", type=Path, default=ROOT / ".diaphane" / "bench", help="results under way")
     parser.add_argument("--quick", action="store_true", help="two scenes at 320x214, nothing is published")
     parser.add_argument("--fresh", action="store_true", help="nothing that was measured before is kept")
-    parser.add_argument("--page-only", action="store_true", help="measure nothing")
+    parser.add_argument(
+        "--page-only", action="store_true", help="measure nothing: write the page of the committed results again"
+    )
     arguments = parser.parse_args()
     if arguments.quick:
         arguments.sizes, arguments.alphas = _QUICK["sizes"], _QUICK["alphas"]
