@@ -112,8 +112,8 @@ def _what(result: BenchResult) -> str:
         lines.append("It was trained on none of these scenes (`python -m benchmarks.comparing.bundle`).")
     else:
         lines.append(
-            "It is not the bundle in `benchmarks/bundle`, and the frames are those of the commits above: `make bench` with "
-            "`--fresh` measures both as they are now."
+            "It is not the bundle in `benchmarks/bundle`, and the frames are those of the commits above: "
+            "`make bench` with `--fresh` measures both as they are now."
         )
     loads = [load for view in views for load in view.load]
     lines.append(f"Load average of the machine around a view: {min(loads):.1f} to {max(loads):.1f}.")
