@@ -14,8 +14,8 @@ from renderer.convert import stage_file
 from renderer.gate import RejectedScene
 from renderer.gate.check import CheckedUpload, check_upload
 from renderer.gate.problems import shown
-from renderer.scene import load_scene
-from renderer.usd.stage import WarningLog, open_stage, stage_time, usd_diagnostics
+from renderer.scene import LoadOptions, load_scene
+from renderer.usd.stage import OutsideHome, WarningLog, open_stage, stage_time, usd_diagnostics, used_layers
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 
@@ -49,11 +49,13 @@ def inspect(folder: Path, root: str, cache: Path | None = None) -> dict[str, Any
         stage_path = stage_file(folder, root, cache or Path(tempfile.gettempdir()))
         home = folder if stage_path.is_relative_to(folder) else stage_path.parent
         counts = _count(stage_path, home, root)
-        scene = load_scene(stage_path)
+        scene = load_scene(stage_path, LoadOptions(home=home))
     except RejectedScene:
         raise
     except MemoryError as error:
         raise RejectedScene("scene-too-large", f"{shown(root)} needs more memory than a scene may use.") from error
+    except OutsideHome as problem:
+        raise RejectedScene("scene-path-outside", problem.title) from problem
     except Problem as problem:
         raise _rejection(problem, root) from problem
     except (OSError, Tf.ErrorException, ArithmeticError, LookupError, RuntimeError, TypeError, ValueError) as error:
@@ -90,7 +92,11 @@ def _count(path: Path, home: Path, root: str) -> _Counts:
     counts = _Counts()
     with usd_diagnostics(WarningLog()):
         stage = open_stage(path)
-        counts.layers = _check_layers(stage, home)
+        counts.layers = used_layers(stage, home)
+        if counts.layers > LIMITS.layers:
+            raise RejectedScene(
+                "scene-too-many-layers", f"The scene uses {counts.layers} layers, more than {LIMITS.layers}."
+            )
         time = stage_time(stage, None)
         for prim in stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)):
             counts.prims += 1
@@ -100,21 +106,6 @@ def _count(path: Path, home: Path, root: str) -> _Counts:
             if counts.points > LIMITS.points:
                 raise RejectedScene("scene-too-large", f"{shown(root)} has more than {LIMITS.points} points.")
     return counts
-
-
-def _check_layers(stage: Usd.Stage, home: Path) -> int:
-    """How many layers the stage uses; all of them lie in the upload."""
-    used = 0
-    for layer in stage.GetUsedLayers():
-        if layer.anonymous:
-            continue
-        used += 1
-        real = layer.realPath or Ar.SplitPackageRelativePathOuter(layer.identifier)[0]
-        if not Path(real.split("[", 1)[0]).resolve().is_relative_to(home):
-            raise RejectedScene("scene-path-outside", "The scene uses a layer outside the upload.")
-    if used > LIMITS.layers:
-        raise RejectedScene("scene-too-many-layers", f"The scene uses {used} layers, more than {LIMITS.layers}.")
-    return used
 
 
 def _points(prim: Usd.Prim, time: Usd.TimeCode, counts: _Counts, parents: tuple[Sdf.Path, ...]) -> int:

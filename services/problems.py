@@ -279,6 +279,7 @@ _TO = rf"(?:{_FROM_ROOT}|[^\s'\"(\[]*?)"
 _HEX = "[0-9a-f]"
 _PATHS = (
     (rf"{_TO}/([a-z][a-z0-9-]{{0,31}})/{_HEX}{{2}}/({_HEX}{{64}})(?!{_HEX})", r"\1/\2"),  # artifacts and blobs
+    (rf"{_TO}/needs/([a-z][a-z0-9-]{{0,31}})/({_HEX}{{64}})(?!{_HEX})", r"\1/\2"),  # artifacts in a child's room
     (rf"{_TO}/sources/\.?{_HEX}{{64}}(?:-{_HEX}{{32}})?/", ""),  # files of scenes and bundles, as these name them
     (rf"{_TO}/sources/({_HEX}{{64}})(?!{_HEX})", r"\1"),
     (rf"{_FROM_ROOT}/(?:tmp|scratch|checkpoints)/(?:[^\s'\"/]+/)*", ""),

@@ -179,9 +179,12 @@ class _Checker:
                     )
 
     def _candidates(self, layer: str, path: str) -> list[str]:
-        """Files of the upload that a resolver could take a path in a layer for."""
+        """Files of the upload that a resolver takes a path in a layer for, the first of them that exists.
+
+        It looks beside the layer, then in the folder that it works in, which is empty, then beside the root layer.
+        """
         package, member = split_package(layer)
-        bases = [posixpath.dirname(package), posixpath.dirname(self._root), ""]
+        bases = [posixpath.dirname(package), posixpath.dirname(self._root)]
         found = [_inside(base, path) for base in bases]
         if member is not None:
             found += [f"{package}[{_inside(base, path)}]" for base in (posixpath.dirname(member), "")]

@@ -24,6 +24,7 @@ from services.engine.claims import Claims
 from services.engine.housekeeping import Housekeeping
 from services.engine.jobs import Jobs
 from services.engine.liveness import Liveness
+from services.engine.rooms import KERNELS, Scratch
 from services.engine.runner import DurableRunner
 from services.engine.states import Abandoned, Cancelled, Claim
 from services.engine.tasks import Place, Tasks
@@ -257,21 +258,17 @@ class Runtime:
         system.limit_slots(self._claimable)
 
     def _child_options(self, children: int) -> ChildOptions:
-        assert self._parts is not None
-        store = self._parts.storage.store.root
-        scratch = self.settings.state.resolve() / "work"
-        cache = self.settings.cache_folder
-        writable = [store, store.parent / "checkpoints", scratch / "numba"]
-        for folder in (*writable, cache):
-            folder.mkdir(parents=True, exist_ok=True)
+        self._scratch = Scratch(self.settings.state.resolve() / "work")
+        self._stack.callback(self._scratch.close)
+        kernels = self._scratch.folder.parent / KERNELS
+        kernels.mkdir(exist_ok=True)
         return ChildOptions(
             make=self._bodies.make,
             inspect=self._bodies.inspect,
             sandbox=self._bodies.sandbox,
-            store=store,
-            read=(store, cache),
-            write=tuple(writable),
-            scratch=scratch,
+            scratch=self._scratch.folder,
+            kernels=kernels,
+            write=(kernels,),
             memory_bytes=self.settings.task_bytes or None,
             threads=max(1, len(os.sched_getaffinity(0)) // max(1, children)),
         )
