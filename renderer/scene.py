@@ -106,7 +106,12 @@ def load_scene(path: Path, options: LoadOptions = LoadOptions(), watch: Watch | 
         raise Problem(
             f"{path} cannot be read as USD: {usd_reason(error)}.", "Check it with usdchecker.", ExitCode.USAGE
         ) from error
-    return replace(scene, warnings=log.lines())
+    return replace(scene, warnings=tuple(_named_from(options.home, line) for line in log.lines()))
+
+
+def _named_from(home: Path | None, line: str) -> str:
+    """A warning with names of files as they are in a folder, wherever that lies today."""
+    return line if home is None else line.replace(f"{home}/", "").replace(f"{home.resolve()}/", "")
 
 
 class _StageReader:

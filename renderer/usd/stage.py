@@ -48,8 +48,8 @@ def usd_diagnostics(log: WarningLog) -> Iterator[None]:
     try:
         yield
     finally:
-        for diagnostic in delegate.TakeUncoalescedDiagnostics():
-            text = str(diagnostic.commentary).strip()
+        # A stage is composed by several threads, which say what they find in any order.
+        for text in sorted(str(diagnostic.commentary).strip() for diagnostic in delegate.TakeUncoalescedDiagnostics()):
             text = re.sub(r" \((instantiating|recomposing|getting).*? stage .*$", "", text, flags=re.DOTALL)
             if ".mtlx@" in text:
                 # The material reader reads these documents itself, and reports those that it cannot.
