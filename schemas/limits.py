@@ -49,6 +49,10 @@ class Limits:
     """Composed prims of an uploaded scene, instance proxies included."""
     points: int = 100_000_000
     """Points of an uploaded scene over all meshes, instances included."""
+    triangles: int = 60_000_000
+    """Triangles of a scene, instances included: about 3.5 GB of arrays when every corner is its own vertex."""
+    clip_steps: int = 100_000
+    """Steps of the value clips of an uploaded scene: a file is looked for at each."""
     texture_pixels: int = 16384 * 16384
     """Pixels of one texture of an uploaded scene."""
     compression_ratio: int = 200
