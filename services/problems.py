@@ -151,7 +151,8 @@ _TYPES = (
         slug="too-many-requests",
         title="Too many requests.",
         status=429,
-        explanation="Requests of a key are limited, and so are failed authentications of an address.",
+        explanation="Requests of a key are limited, and its scenes that wait for their checks, and so are failed "
+        "authentications of an address.",
         remedy="Wait for the seconds in the header `Retry-After`.",
     ),
     ProblemType(

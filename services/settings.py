@@ -27,6 +27,11 @@ class Settings(BaseSettings):
         slots_render: Child processes of a worker for the role `render`.
         slots_label: The same for `label`.
         slots_train: The same for `train`.
+        slots_check: Uploads that a worker of the role `render` checks at once, beside its tasks.
+        checks_per_key: Uploads of one key that all workers together check at once: less than their slots, so that one
+            key cannot hold them all.
+        check_seconds: Longest time of a check.
+        check_bytes: Memory that a check's process may use.
         task_seconds: Longest time of a task other than a training.
         train_seconds: Longest time of a training.
         task_bytes: Memory that a task's process may use; 0: no bound.
@@ -51,6 +56,10 @@ class Settings(BaseSettings):
     slots_render: int = Field(default=1, ge=1)
     slots_label: int = Field(default=1, ge=1)
     slots_train: int = Field(default=1, ge=1)
+    slots_check: int = Field(default=2, ge=1)
+    checks_per_key: int = Field(default=1, ge=1)
+    check_seconds: float = Field(default=30.0, gt=0.0)
+    check_bytes: int = Field(default=2 << 30, ge=512 << 20)
     task_seconds: float = Field(default=1800.0, gt=0.0)
     train_seconds: float = Field(default=7 * 86400.0, gt=0.0)
     task_bytes: int = Field(default=0, ge=0)

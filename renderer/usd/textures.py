@@ -156,7 +156,9 @@ def decode_image(data: bytes, space: str = "auto", max_side: int = MAX_SIDE) -> 
             coloured = file.mode in ("RGB", "RGBA", "P", "PA", "CMYK", "YCbCr", "LAB", "RGBX", "RGBa") and not deep
             has_alpha = file.has_transparency_data
             image = (_grey8(file) if file.mode.startswith(("I", "F")) else file).convert("RGBA")
-    except (OSError, ValueError, SyntaxError, EOFError, RuntimeError, Image.DecompressionBombError) as error:
+    except MemoryError:
+        raise
+    except Exception as error:  # decoders raise whatever they stumble over: a palette that is missing is an assertion
         raise TextureUnreadable("the texture cannot be decoded") from error
     return Decoded(_fitted(image, max_side), space == "sRGB" or (space == "auto" and coloured), has_alpha)
 

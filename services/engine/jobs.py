@@ -21,12 +21,11 @@ from schemas.service import EventRecord, ExecutorRecord, JobRecord, QueueRecord,
 from services.acceptance import Accepted
 from services.clock import iso
 from services.database import Database, tables
-from services.engine import events, progress, queues, states, system
+from services.engine import checks, events, progress, queues, states, system
 from services.engine.events import Event
 from services.engine.liveness import clock
 from services.settings import Settings
 from services.store import canonical_json
-from services.tasks import ROLES
 
 if TYPE_CHECKING:
     from dbos import DBOSClient
@@ -286,18 +285,22 @@ class Jobs:
             return events.read(connection, job_id, after, limit)
 
     def queues(self) -> builtins.list[QueueRecord]:
-        """How much waits and runs, by role."""
+        """How much waits and runs, by role, and of checks."""
         table = system.workflows(self._database)
         query = (
             sa.select(table.c.queue_name, table.c.status, sa.func.count().label("number"))
-            .where(table.c.status.in_(system.LIVE), table.c.queue_name.in_(ROLES))
+            .where(table.c.status.in_(system.LIVE), table.c.queue_name.in_(queues.QUEUES))
             .group_by(table.c.queue_name, table.c.status)
         )
         counts: Counter[tuple[str, bool]] = Counter()
         with self._database.read() as connection:
             for row in connection.execute(query):
                 counts[row.queue_name, row.status == "PENDING"] += row.number
-        return [QueueRecord(role=role, queued=counts[role, False], running=counts[role, True]) for role in ROLES]
+            open_checks = sa.select(sa.func.count()).where(tables.scenes.c.state == "checking")
+            # Most of them wait in the queues of their keys.
+            waiting = int(connection.scalar(open_checks) or 0) - counts[queues.CHECKS, True]
+        counts[queues.CHECKS, False] = max(0, waiting)
+        return [QueueRecord(role=q, queued=counts[q, False], running=counts[q, True]) for q in queues.QUEUES]
 
     def executors(self) -> builtins.list[ExecutorRecord]:
         """Processes that run work, and those that did lately."""
@@ -314,16 +317,14 @@ class Jobs:
             for row in rows
         ]
 
-    def check_scene(self, scene_id: str) -> None:
-        """Queues the check of an uploaded scene; doing it again changes nothing while one waits or runs."""
+    def check_next(self, scene_id: str) -> None:
+        """Has workers check what the key that sent a scene has waiting; see `services.engine.checks`."""
 
         def body(connection: sa.Connection) -> None:
-            prefix = f"{scene_id}/"
-            found = system.statuses(connection, self._database, prefix)
-            if not any(status in system.LIVE for _, status in found):
-                workflow_id = f"{prefix}{len(found)}"
-                first = queues.CLASSES["high"]  # somebody waits for it
-                system.enqueue(self.client, connection, "check", workflow_id, "render", scene_id, priority=first)
+            sender = sa.select(tables.scenes.c.created_by).where(tables.scenes.c.id == scene_id)
+            key = connection.scalar(sender)
+            if key is not None:
+                checks.queue_next(connection, self._database, self.client, key, self._settings.checks_per_key)
 
         self._database.retry(body)
 

@@ -31,7 +31,6 @@ from services.database import Database, tables
 from services.engine import system
 from services.engine.claims import Claims
 from services.settings import Settings
-from services.tasks import Role
 
 FORGOTTEN_SECONDS = 24 * 3600.0
 ORPHAN_LOOKS = 3
@@ -72,7 +71,7 @@ class Liveness:
         settings: Of the service.
         database: The database.
         claims: What runs here.
-        slots: Roles of this process and what it does of each at once.
+        slots: Queues of this process and what it does of each at once.
         adrift: Sees to jobs and checks that nobody does any more; called by those who conduct jobs.
     """
 
@@ -81,7 +80,7 @@ class Liveness:
         settings: Settings,
         database: Database,
         claims: Claims,
-        slots: Mapping[Role, int],
+        slots: Mapping[str, int],
         adrift: Callable[[], None] = lambda: None,
     ) -> None:
         self.executor = f"{socket.gethostname()}-{os.getpid()}-{uuid.uuid4().hex[:8]}"

@@ -128,7 +128,7 @@ class Runtime:
         self._stack.callback(self._jobs.close)
         self._parts = self._parts or open_parts(self.settings, self._database, self._jobs)
         self._tasks = Tasks(self._database, self._jobs.client, self._bodies.retry_seconds)
-        children: dict[Role, int] = {role: count for role, count in self._slots.items() if role != "jobs"}
+        children: dict[Role, int] = {role: self._slots[role] for role in self.roles if role != "jobs"}
         options = self._child_options(sum(children.values()))
         self._worker = Worker(self.settings, self._parts.storage, self._tasks, self._claims, options, children)
         self._liveness = Liveness(self.settings, self._database, self._claims, self._slots, self._see_to_adrift)
@@ -204,6 +204,7 @@ class Runtime:
         claim = Claim(workflow_id, self.executor)
         with self._claims.hold(workflow_id), structlog.contextvars.bound_contextvars(scene_id=scene_id):
             self._worker.check(claim, scene_id, self._parts.scenes)
+            self._jobs.check_next(scene_id)
 
     def _see_to_adrift(self) -> None:
         for job_id in states.end_adrift(self._database):
@@ -240,7 +241,7 @@ class Runtime:
         from dbos import DBOS, DBOSConfig, DBOSPortableJSONSerializer
 
         flow.use(self)
-        self._claimable.update({str(role): count for role, count in self._slots.items()})
+        self._claimable.update(self._slots)
         config = DBOSConfig(
             name=system.APPLICATION,
             system_database_url=system.engine_url(self._database.url),

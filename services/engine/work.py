@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 
 REPORT_SECONDS = 1.0
 LINES_PER_TASK = 2000
-CHECK_SECONDS = 300.0
-CHECK_MEMORY_BYTES = 8 << 30
 CHECK_TRIES = 2
 
 log = structlog.get_logger(__name__)
@@ -168,8 +166,8 @@ class Worker:
         folder = materialise(source, self._storage.blobs, self._settings.cache_folder)
         request = {"source": source.digest, "root": source.root}
         assignment = Assignment(subject=source.digest, sources={source.digest: folder})
-        options = replace(self._options, write=(), memory_bytes=CHECK_MEMORY_BYTES)
-        seconds = min(self._settings.task_seconds, CHECK_SECONDS)
+        options = replace(self._options, write=(), memory_bytes=self._settings.check_bytes)
+        seconds = self._settings.check_seconds
         for left in reversed(range(CHECK_TRIES)):
             child = Child(options, self._spawner, f"check-{scene_id}")
             self._claims.on_loss(claim.workflow_id, child.lose)

@@ -76,6 +76,8 @@ def inspect(folder: Path, root: str) -> dict[str, Any]:
     text = (folder / root).read_text()
     if text == "crash":
         os.kill(os.getpid(), signal.SIGSEGV)
+    if text.startswith("slow"):
+        time.sleep(600.0)
     if text == "bad":
         raise Problem("The scene is bad.", "Send a good one.")
     return {"triangles": len(text)}
