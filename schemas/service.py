@@ -281,7 +281,7 @@ class KeyRecord(_Record):
 
 
 class QueueRecord(_Record):
-    """How much waits for a role."""
+    """How much waits for a role, or, as `check`, how many uploads wait for their check."""
 
     role: str
     queued: int

@@ -2,7 +2,7 @@
 # Sees to what only the tests need: PostgreSQL's programs, with which the tests start servers of their own; Mesa's zink
 # over its software Vulkan driver, on which they draw every technique a second time; the reference compiler of GLSL; a
 # C and a C++ compiler for the header of deploy/client/c; a browser for the dashboard, and its font; a display
-# without a screen, and hands for its keyboard and mouse, for the viewer; a tracer, for what uploads make a process open.
+# without a screen, and hands for its keyboard and mouse, for the viewer; strace, for what uploads make processes open.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=scripts/common.sh

@@ -31,6 +31,7 @@ from services.engine.tasks import Place, Tasks
 from services.engine.work import Worker
 from services.problems import document_of, summary_of
 from services.settings import Settings
+from services.sources import sweep_sources
 from services.tasks import ROLES, Role
 
 if TYPE_CHECKING:
@@ -261,6 +262,7 @@ class Runtime:
     def _child_options(self, children: int) -> ChildOptions:
         self._scratch = Scratch(self.settings.state.resolve() / "work")
         self._stack.callback(self._scratch.close)
+        sweep_sources(self.settings.cache_folder, time.time())
         kernels = self._scratch.folder.parent / KERNELS
         kernels.mkdir(exist_ok=True)
         return ChildOptions(
