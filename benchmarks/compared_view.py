@@ -43,7 +43,7 @@ def make(service: Service, digest: str) -> str:
     with store.put(label) as folder:
         k = [np.minimum(rng.integers(0, 3, pixels), n).astype(np.int32) for _ in RULES]
         made = {
-            rule: [Allocation(rule, pixels, each, int(each.sum()), 0.0, 0)] for rule, each in zip(RULES, k, strict=True)
+            rule: [Allocation(rule, pixels, each, int(each.sum()), 0.0)] for rule, each in zip(RULES, k, strict=True)
         }
         write_allocations(folder, made)
     evaluate = Address("evaluate", "benchmark", (render.key, label.key), {"tail": "density-16", "g": 0.75})

@@ -1,12 +1,12 @@
-"""Predictors on assets they have not seen: tails, sizes, features, losses, presets, trials, and what each costs.
+"""Predictors on assets they have not seen: every tail of depth bins with every size of network, and what each costs.
 
-python -m benchmarks.predictors --scenes ../shared/scenes --work FOLDER \
+python -m benchmarks.predictors --scenes ../shared/scenes --scenes ../shared/training-scenes --work FOLDER \
     --out benchmarks/results/predictors.json --page benchmarks/PREDICTORS.md
 
-It can be stopped at any time and goes on where it was: dumps, labels, networks and scores lie in `--work`, and are
-made again only where the data or the code that decides them have changed. Plots lie beside the figures. Without
-`--scenes` it takes the project's own scenes alone. All variants take days at full size: `--size 358x240 --views 1
---folds 3` and another `--out` tries them on an eighth of the pixels.
+No page is committed: this command makes it. It can be stopped at any time and goes on where it was: dumps, labels,
+networks and scores lie in `--work`, and are made again only where the data or the code that decides them have changed.
+Plots lie beside the figures. Without `--scenes` it takes the project's own scenes alone. All variants take a day or
+more at full size: `--size 358x240 --views 1 --folds 3` and another `--out` tries them on an eighth of the pixels.
 """
 
 from __future__ import annotations
@@ -23,16 +23,12 @@ from benchmarks import provenance
 from benchmarks.outputs import add_outputs, write_figures, write_page
 from benchmarks.predicting.page import page, plots
 from benchmarks.predicting.store import Store
-from benchmarks.predicting.summary import rules_summary, score, tails_summary, variant_summary
-from benchmarks.predicting.tails import scored
+from benchmarks.predicting.summary import rules_summary, score, variant_summary
 from benchmarks.predicting.training import Trainings
-from benchmarks.predicting.variants import Variant, variants
+from benchmarks.predicting.variants import variants
 from benchmarks.predicting.views import views_of
 
-PARTS = (
-    *("variants", "bundles", "rules", "features", "sizes", "seeds", "presets", "losses", "labels", "inputs"),
-    *("augmentation", "tails"),
-)
+PARTS = ("variants", "rules")
 SIZE = "715x480"
 
 
@@ -45,36 +41,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
     store = Store(given.work)
     rows = views_of(store, given.scenes, given.size, given.views)
     if not rows:
-        print("No view has more fragments than pixels.", file=sys.stderr)
+        print("No view has fragments enough for a budget.", file=sys.stderr)
         return 1
     trainings = Trainings(store, rows, given.folds)
     setting = {
+        "scenes": [x.name if x.is_absolute() else str(x) for x in given.scenes],
         "size": list(given.size),
         "most": given.views,
         "views": len(rows),
+        "scored": sum(row.is_scored for row in rows),
         "assets": len(trainings.fold),
         "folds": len(trainings.folds),
     }
     found = _before(given.out, setting, arguments)
-    for part in given.parts:
-        if part == "rules":
-            found["rules"] = rules_summary(store, rows)
-        elif part == "tails":
-            found["tails"] = tails_summary(scored(store, rows))
-        for variant in _wanted(part, given.variants):
-            start = time.perf_counter()
-            summary = variant_summary(trainings, variant)
-            found["variants"][variant.name] = summary
-            taken = time.perf_counter() - start
-            print(f"{variant.name}: score {score(summary['q']):.3f}, {taken:.0f} s", file=sys.stderr, flush=True)
-            _write(given.out, given.page, found)
+    if "rules" in given.parts:
+        found["rules"] = rules_summary(store, rows)
+        _write(given.out, given.page, found)
+    for name in (given.variants or variants()) if "variants" in given.parts else ():
+        start = time.perf_counter()
+        summary = found["variants"][name] = variant_summary(trainings, variants()[name])
+        taken = time.perf_counter() - start
+        print(f"{name}: score {score(summary['q']):.3f}, {taken:.0f} s", file=sys.stderr, flush=True)
         _write(given.out, given.page, found)
     print(page(found, _name(given.out)))
     return 0
-
-
-def _wanted(part: str, names: Sequence[str] | None) -> list[Variant]:
-    return [x for x in variants().values() if x.part == part and (names is None or x.name in names)]
 
 
 def _before(out: Path | None, setting: dict[str, Any], arguments: Sequence[str] | None) -> dict[str, Any]:
@@ -101,13 +91,14 @@ def _name(out: Path | None) -> str:
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", type=Path, help="Folder with MANIFEST.json; without it, the project's own scenes.")
+    described = "With MANIFEST.json; may be given again. Without it, the project's own scenes."
+    parser.add_argument("--scenes", action="append", default=[], type=Path, metavar="FOLDER", help=described)
     parser.add_argument("--work", type=Path, help="Where dumps, labels, networks and scores are kept.")
     parser.add_argument("--size", type=_size, default=_size(SIZE), metavar="WxH", help=f"Of the views: {SIZE}.")
     parser.add_argument("--views", type=int, default=2, help="Most views of a stage, in each mode.")
     parser.add_argument("--folds", type=int, default=5, help="Parts of the assets, each held out once.")
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=", ".join(PARTS))
-    parser.add_argument("--variants", nargs="+", metavar="NAME", help="Of the parts, these variants only.")
+    parser.add_argument("--variants", nargs="+", metavar="NAME", help="These variants only.")
     add_outputs(parser)
     parser.add_argument("--page-only", action="store_true", help="Nothing is measured: the page of what is in --out.")
     given = parser.parse_args(arguments)

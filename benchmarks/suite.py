@@ -21,7 +21,18 @@ from pathlib import Path
 
 from benchmarks.casting.cases import SHARED as FOLDER
 from benchmarks.comparing.page import page, pictures
-from benchmarks.comparing.scenes import ALPHAS, BUNDLE, PARTS, SHARED, SIZES, Part, cases_of, parts_of
+from benchmarks.comparing.scenes import (
+    ALPHAS,
+    BUNDLE,
+    GROUPS,
+    PARTS,
+    SHARED,
+    SIZES,
+    Part,
+    cases_of,
+    parts_of,
+    selected,
+)
 from renderer.context import describe, gl_context
 from renderer.techniques import TECHNIQUES as technique_entries
 from schemas.bench import BenchResult, BenchView
@@ -52,10 +63,10 @@ def main() -> int:
     _begin(work, arguments.fresh, with_committed=not arguments.quick)
     left_out: list[str] = []
     with tempfile.TemporaryDirectory(prefix="diaphane-suite-") as folder:
-        every = cases_of(arguments.scenes, Path(folder))
-        if absent := {*SHARED} - {case.scene for case in every}:
+        only = selected(arguments.only.split(",")) if arguments.only else None
+        cases = cases_of(arguments.scenes, Path(folder), only)
+        if absent := {*SHARED} & (only or {*SHARED}) - {case.scene for case in cases}:
             progress.note(f"{', '.join(sorted(absent))}: not in {arguments.scenes}, left out")
-        cases = [case for case in every if not arguments.only or case.scene in arguments.only.split(",")]
         parts = list(parts_of(cases, arguments.alphas, arguments.sizes))
         for number, part in enumerate(parts if not arguments.page_only else ()):
             start = time.perf_counter()
@@ -136,7 +147,7 @@ def plain_path(line: str) -> str:
 def _options(part: Part, arguments: argparse.Namespace, work: Path) -> BenchOptions:
     return BenchOptions(
         scenes=(part.case.path,),
-        techniques=TECHNIQUES,
+        techniques=tuple(name for name in TECHNIQUES if part.measures(name)),
         out=work,
         alphas=(part.alpha,),
         sizes=(part.size,),
@@ -158,7 +169,7 @@ def _tell(progress: Progress, part: Part, number: int, total: int, seconds: floa
 def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", type=Path, default=FOLDER, help="with MANIFEST.json")
-    parser.add_argument("--only", help="names of scenes, with commas: a part of the suite")
+    parser.add_argument("--only", help=f"scenes or groups ({', '.join(GROUPS)}), with commas")
     parser.add_argument("--alpha", dest="alphas", type=parse_alphas, default=ALPHAS, help="as of diaphane bench")
     parser.add_argument("--size", dest="sizes", type=parse_sizes, default=SIZES, help="as of diaphane bench")
     parser.add_argument("--views", type=int, default=1, help="of each scene")

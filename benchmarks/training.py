@@ -108,11 +108,11 @@ def _by_rule(judges: Sequence[ViewData], rule: Callable[[Counts, int], Counts]) 
 
 
 def _uniform(n: Counts, budget: int) -> Counts:
-    return budget_fill(np.ones(len(n)), n, budget, 1)
+    return budget_fill(np.ones(len(n)), n, budget)
 
 
 def _proportional(n: Counts, budget: int) -> Counts:
-    return budget_fill(n.astype(np.float64), n, budget, 1)
+    return budget_fill(n.astype(np.float64), n, budget)
 
 
 def _eq3(n: Counts, budget: int) -> Counts:

@@ -24,8 +24,6 @@ class Allocation:
         k: int32 [P], 0 <= k <= n.
         used: Sum of k, <= F.
         error: Sum of the squared errors e_p(k_p).
-        k_min: Fewest fragments of an occupied pixel: 1 where the budget covers it, else 0 (`fixed` and
-            `dynamic`, one k for all pixels, ignore it).
         exact: Whether the budget covers all fragments, so that nothing had to be decided: k = n, error 0.
         bound: Lower bound of the error of any allocation within the budget (rule `optimal`).
         gap: `(error - bound) / error`, 0 where the error is 0 (rule `optimal`).
@@ -38,7 +36,6 @@ class Allocation:
     k: NDArray[np.int32]
     used: int
     error: float
-    k_min: int
     exact: bool = False
     bound: float | None = None
     gap: float | None = None
@@ -46,6 +43,6 @@ class Allocation:
     proven: bool = False
 
 
-def measured(rule: RuleName, budget: int, k: NDArray[np.int32], curves: Curves, k_min: int) -> Allocation:
+def measured(rule: RuleName, budget: int, k: NDArray[np.int32], curves: Curves) -> Allocation:
     """An allocation with its use and error, without a bound."""
-    return Allocation(rule, budget, k, int(k.sum(dtype=np.int64)), curves.total(k), k_min)
+    return Allocation(rule, budget, k, int(k.sum(dtype=np.int64)), curves.total(k))

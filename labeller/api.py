@@ -31,7 +31,6 @@ def allocate(
     tail: TailName = DEFAULT_TAIL,
     g: float = DENSITY_G,
     metric: MetricName = "display",
-    k_min: int = 1,
     weights: ArrayLike | None = None,
     vkb: VkbOptions = _VKB,
     fill: FillName = "exact",
@@ -56,14 +55,14 @@ def allocate(
             - `depth`: [N], view-space distance, > 0, not falling within a pixel, in any one unit.
             - `background` (white): uint8 [P, 3] or [3], gamma-2 encoded colour of what lies behind.
             - `facing` (255): uint8 [P], |n . e| * 255 of the nearest fragment, for rule `importance`.
-            - `shape` (one row, or that of `counts`): (H, W), for rule `importance`.
+            - `shape` (one row, or that of `counts`): (H, W), for rule `importance` and the binned tails, whose bins
+              lie between the ends of tiles.
         budgets: Fragment counts F >= 0, in any order; F >= N gives k = n, flagged `exact`.
         rule: One of `labeller.RULES`: `optimal` (certified), `greedy` (DHOIT, Algorithm 1), `increment`, `fixed`,
             `dynamic` (k+-buffer), `importance` (VKB), `uniform`, `proportional`.
         tail: What stands for the fragments beyond k: one of `schemas.tail.TAILS` (METHOD section 2).
         g: Steepness of the density tail.
         metric: Space of the squared error, which is summed over RGB: `display` (sRGB, clamped), `linear` or `paper`.
-        k_min: Fewest fragments of an occupied pixel: 1 (or 0 at a budget that does not cover that), or always 0.
         weights: [P] or [H, W], >= 0: what a pixel's error counts, such as a saliency map; None: every pixel counts 1.
         vkb: Factors of rule `importance`.
         fill: How `importance`, `uniform` and `proportional` come from weights to counts.
@@ -76,17 +75,15 @@ def allocate(
         Problem: An argument cannot be used; it says which and what to give instead.
     """
     _one_of("rule", rule, RULES)
-    _one_of("tail", tail, TAILS)
+    _one_of("tail", tail, tuple(TAILS))
     _one_of("metric", metric, METRICS)
     _one_of("fill", fill, get_args(FillName))
-    if not isinstance(k_min, int | np.integer) or k_min not in (0, 1):
-        raise _wrong(f"k_min is {k_min}.", "Give 0 or 1.")
     if not isinstance(vkb, VkbOptions):
         raise _wrong(f"vkb is of type {type(vkb).__name__}.", "Give renderer.allocation.importance.VkbOptions.")
     wanted = budgets_of(budgets)
     dump = fragments if isinstance(fragments, FragmentDump) else fragments_of(fragments)
     curves = error_curves(dump, tail, g, metric, None if weights is None else _weights(weights, dump))
-    return allocate_curves(dump, curves, wanted, rule, vkb=vkb, fill=fill, k_min=k_min)
+    return allocate_curves(dump, curves, wanted, rule, vkb=vkb, fill=fill)
 
 
 def fragments_of(arrays: Mapping[str, ArrayLike]) -> FragmentDump:

@@ -21,7 +21,7 @@ def fixed(n: NDArray[np.integer], budget: int) -> NDArray[np.int32]:
 
 
 def weighted(
-    dump: FragmentDump, rule: WeightRule, budget: int, k_min: int, options: VkbOptions, fill: FillName
+    dump: FragmentDump, rule: WeightRule, budget: int, options: VkbOptions, fill: FillName
 ) -> NDArray[np.int32]:
     """int32 [P]: fragments in proportion to a weight of the pixel.
 
@@ -29,7 +29,6 @@ def weighted(
         dump: Fragments of a view.
         rule: `importance`: VKB; `uniform`: 1 where occupied; `proportional`: n.
         budget: F.
-        k_min: 0 or 1.
         options: Factors of VKB.
         fill: `exact`: the budget fill; `paper`: DHOIT's Eq. 3, here clipped to n (its other slots stay empty).
     """
@@ -40,4 +39,4 @@ def weighted(
         weights = (np.minimum(n, 1) if rule == "uniform" else n).astype(np.float32)
     if fill == "paper":
         return np.minimum(paper_fill(weights, budget), n).astype(np.int32)
-    return budget_fill(weights, n, budget, k_min)
+    return budget_fill(weights, n, budget)

@@ -7,8 +7,8 @@ from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from renderer.depth_bins import MOST_BINS
 from renderer.features import FEATURES
+from schemas.tail import MOST_BINS
 
 CountType = Literal["uint16", "uint32"]
 """dtype of the columns that count fragments: the wider one where a list is longer than 65,535."""
@@ -46,21 +46,19 @@ def _rgb(name: str, meaning: str) -> dict[str, str]:
 FEATURE_MEANINGS: Final[Mapping[str, str]] = {
     "log_n": "log2 of the number of fragments n",
     "optical_depth": "log(1 + D), D = sum of -ln(1 - alpha)",
-    "alpha_mean": "mean alpha, 0..1",
-    "alpha_std": "standard deviation of alpha, 0..1",
-    "alpha_nearest": "alpha of the nearest fragment, 0..1",
-    **_rgb("rgb_mean", "mean over the fragments, gamma-2 encoded, 0..1"),
-    **_rgb("rgb_alpha", "mean weighted by alpha, gamma-2 encoded, 0..1"),
-    **_rgb("rgb_nearest", "of the nearest fragment, gamma-2 encoded, 0..1"),
+    **_rgb("rgb_mean", "mean over the fragments, weighted by optical depth, gamma-2 encoded, 0..1"),
+    **_rgb("rgb_std", "standard deviation over the fragments, weighted by optical depth, gamma-2 encoded, 0..1"),
     **_rgb("background", "of what lies behind, gamma-2 encoded, 0..1"),
-    **_rgb("rgb_std", "standard deviation over the fragments, gamma-2 encoded, 0..1"),
-    **_rgb("rgb_depth_cov", "covariance of the gamma-2 encoded colour with relative depth"),
-    "depth_mean": "mean relative depth (z - z_min) / (z_max - z_min), 0..1",
-    "depth_std": "standard deviation of the relative depth, 0..1",
-    "depth_extent": "log(1e-4 + (z_max - z_min) / z_max)",
+    "depth_mean": "mean place y in the tile's range, weighted by optical depth, 0..1",
+    "luma_depth_cov": "covariance of gamma-2 encoded Rec. 709 luma with the place y, weighted by optical depth",
+    "depth_extent": "log(1e-4 + (z_far - z_near) / z_far) of the tile's range",
     **{
-        f"front_{j}": f"share of D in front of depth bin {j} of 16, 0..1; 0 where the tail has no such bin"
-        for j in range(1, MOST_BINS)
+        f"front_{b}": f"share of D in front of depth bin {b}, counted from 0, 0..1; 0 where the tail has no such bin"
+        for b in range(1, MOST_BINS)
+    },
+    **{
+        f"mean_{b}": f"mean position of the optical depth in depth bin {b - 1}, 0..1; 0 where the tail keeps none"
+        for b in range(1, MOST_BINS)
     },
 }
 """What `renderer.features.FEATURES` hold, in their order."""
@@ -88,14 +86,14 @@ def columns(count_type: CountType = "uint16") -> tuple[Column, ...]:
             per="row",
             dtype=count_type,
             unit="segments",
-            meaning="segments of the lower hull of the pixel's error curve; 0 where it is exact at k_min",
+            meaning="segments of the lower hull of the pixel's error curve; 0 where it is exact at k = 0",
         ),
         Column(
             name="hull_length",
             per="segment",
             dtype=count_type,
             unit="fragments",
-            meaning="how many more fragments the segment's end keeps than its start; a row's first starts at k_min",
+            meaning="how many more fragments the segment's end keeps than its start; a row's first starts at 0",
         ),
         Column(
             name="hull_error",

@@ -33,13 +33,11 @@ class Core(NamedTuple):
         offsets: int64 [C+1], where their curves begin.
         error: float32 [E], their curves, from k = 0.
         base: int32 [C], where they stand.
-        least: int32 [C], fewest fragments they may have.
     """
 
     offsets: NDArray[np.int64]
     error: NDArray[np.float32]
     base: NDArray[np.int32]
-    least: NDArray[np.int32]
 
 
 class Solution(NamedTuple):
@@ -124,12 +122,11 @@ def _losses(core: Core, lam: float) -> NDArray[np.float64]:
     loss = np.empty(len(core.error))
     for c in range(len(core.base)):
         begin, end = core.offsets[c], core.offsets[c + 1]
-        cheapest = begin + core.least[c]
-        loss[begin:cheapest] = np.inf
-        for i in range(cheapest + 1, end):
+        cheapest = begin
+        for i in range(begin + 1, end):
             if np.float64(core.error[i]) - np.float64(core.error[cheapest]) + lam * (i - cheapest) < 0.0:
                 cheapest = i
-        for i in range(begin + core.least[c], end):
+        for i in range(begin, end):
             price = lam * (i - cheapest)
             lost = np.float64(core.error[i]) - np.float64(core.error[cheapest]) + price
             loss[i] = lost if lost > _ROUNDING * abs(price) else 0.0

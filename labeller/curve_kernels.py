@@ -15,36 +15,48 @@ from numba import njit, prange
 from numpy.typing import NDArray
 
 from labeller.numerics import add_squared, display_of, tail_weights
-from renderer.depth_bins import binned_exponents
-from schemas.tail import MAX_EXPONENT
+from renderer.depth_bins import BinForm, Kept, binned_exponents, kept_room, place_of
+from schemas.tail import MAX_EXPONENT, TailKind
 
-DENSITY: Final = 0
-WEIGHTED_AVERAGE: Final = 2
-PAPER: Final = 3
+_DENSITY: Final = int(TailKind.DENSITY)
+_WEIGHTED_AVERAGE: Final = int(TailKind.WEIGHTED_AVERAGE)
+_PAPER: Final = int(TailKind.PAPER)
 DISPLAY: Final = 0
 _BLOCK: Final = 2048  # entries: what is in work then fits in the second-level cache
 _ROUNDING: Final = 1e-24  # squared differences below this are the rounding of float64 sums: the pixel is exact
 
 
 class Lists(NamedTuple):
-    """A dump, and the chunks of pixels that threads take."""
+    """A dump, where each pixel's depth bins lie (or nothing), and the chunks of pixels that threads take."""
 
     offsets: NDArray[np.int64]
     rgba: NDArray[np.uint8]
     depth: NDArray[np.float32]
     background: NDArray[np.uint8]
+    nearest: NDArray[np.float32]
+    extent: NDArray[np.float32]
     chunks: NDArray[np.int64]
 
 
 class Look(NamedTuple):
-    """How lists become colours: tail and its depth bins (0: none), metric, and tables of the 256 stored values."""
+    """How lists become colours: a tail's kind and depth bins, metric, and tables of the 256 stored values.
+
+    Compiled loops take no tuple in a tuple: the form of the bins is taken apart.
+    """
 
     tail: int
     bins: int
+    share_levels: int
+    mean_levels: int
     space: int
     decode: NDArray[np.float64]
     level: NDArray[np.float64]
     optical: NDArray[np.float64]
+
+
+@njit(inline="always")
+def _form(look: Look) -> BinForm:
+    return BinForm(look.bins, look.share_levels, look.mean_levels)
 
 
 class _Block(NamedTuple):
@@ -107,14 +119,14 @@ def errors_of(
     """
     offsets = lists.offsets
     # The last fragment alone in a tail shows what it is: no error, but for the tail that has no opacity factor.
-    lossless = 1 if look.tail == PAPER else 2
+    lossless = 1 if look.tail == _PAPER else 2
     for chunk in prange(len(lists.chunks) - 1):
         first, end = lists.chunks[chunk], lists.chunks[chunk + 1]
         longest = 0
         for p in range(first, end):
             longest = max(longest, offsets[p + 1] - offsets[p])
         room = max(_BLOCK, longest)
-        block, counts, front = _block(room), np.empty(room, dtype=np.int64), np.empty(look.bins + 1)
+        block, counts, kept = _block(room), np.empty(room, dtype=np.int64), kept_room()
         while first < end:
             last, used = first, 0
             while last < end and last - first < room:
@@ -125,7 +137,7 @@ def errors_of(
                 counts[last - first] = entries
                 used += entries
                 last += 1
-            _gather(lists, look, first, counts[: last - first], front, block)
+            _gather(lists, look, first, counts[: last - first], kept, block)
             for j in range(len(gs)):
                 _mix(look, gs[j], counts[: last - first], used, block)
                 _store(offsets, first, counts[: last - first], weights, block.squared, error[j])
@@ -133,9 +145,7 @@ def errors_of(
 
 
 @njit(cache=True, error_model="numpy")
-def _gather(
-    lists: Lists, look: Look, first: int, counts: NDArray[np.int64], front: NDArray[np.float64], block: _Block
-) -> None:
+def _gather(lists: Lists, look: Look, first: int, counts: NDArray[np.int64], kept: Kept, block: _Block) -> None:
     """Everything of the pixels' entries that does not depend on g."""
     at = 0
     for j in range(len(counts)):
@@ -147,7 +157,8 @@ def _gather(
         rgba, depth = lists.rgba[begin : begin + n], lists.depth[begin : begin + n]
         optical = _core(look, rgba, lists.background[p], at, block)
         if look.bins:
-            binned_exponents(depth, rgba, optical, front, block.exponent[at : at + n])
+            exponent = block.exponent[at : at + n]
+            binned_exponents(_form(look), depth, rgba, lists.nearest[p], lists.extent[p], kept, exponent)
             at += n
             continue
         near = np.float64(depth[0])
@@ -202,23 +213,23 @@ def tail_factors(tail: int, count: int, alphas: float, through: float) -> tuple[
     """What a tail's mean colour, and the background, are multiplied with.
 
     Args:
-        tail: Index in `schemas.tail.TAILS`.
+        tail: `schemas.tail.TailKind`.
         count: Fragments of the tail.
         alphas: Sum of their alphas.
         through: Product of their `1 - alpha`.
     """
     if alphas <= 0.0:
         return 0.0, 1.0
-    if tail in (WEIGHTED_AVERAGE, PAPER):
+    if tail in (_WEIGHTED_AVERAGE, _PAPER):
         through = max(1.0 - alphas / count, 0.0) ** count
-    return (1.0 if tail == PAPER else 1.0 - through), through
+    return (1.0 if tail == _PAPER else 1.0 - through), through
 
 
 @njit(cache=True, error_model="numpy")
 def _mix(look: Look, g: float, counts: NDArray[np.int64], used: int, block: _Block) -> None:
     """Squared differences of all entries."""
     weight = block.alpha
-    if look.bins or (look.tail == DENSITY and g > 0.0):
+    if look.bins or (look.tail == _DENSITY and g > 0.0):
         weight = block.weight
         tail_weights(block.alpha[:used], block.exponent[:used], 1.0 if look.bins else g, weight[:used])
     at = 0
@@ -283,11 +294,11 @@ def colours_of(lists: Lists, look: Look, g: float, kept: NDArray[np.int32], out:
     """
     offsets, decode, level = lists.offsets, look.decode, look.level
     for chunk in prange(len(lists.chunks) - 1):
-        core, sums, front = np.empty(3), np.empty(3), np.empty(look.bins + 1)
+        core, sums, kept_bins = np.empty(3), np.empty(3), kept_room()
         exponents = np.empty(0)
         for p in range(lists.chunks[chunk], lists.chunks[chunk + 1]):
             n, k = offsets[p + 1] - offsets[p], kept[p]
-            rgba, depth = lists.rgba[offsets[p] : offsets[p + 1]], lists.depth[offsets[p] : offsets[p + 1]]
+            rgba = lists.rgba[offsets[p] : offsets[p + 1]]
             core[:], t = 0.0, 1.0
             for i in range(k):
                 for c in range(3):
@@ -297,7 +308,7 @@ def colours_of(lists: Lists, look: Look, g: float, kept: NDArray[np.int32], out:
             if len(exponents) < n:
                 exponents = np.empty(2 * n)
             if k < n:
-                _exponents(look, g, rgba, depth, front, exponents[:n])
+                _exponents(lists, look, g, p, kept_bins, exponents[:n])
             for i in range(n - 1, k - 1, -1):
                 alpha = level[rgba[i, 3]]
                 w = alpha * math.exp(-min(exponents[i], MAX_EXPONENT))
@@ -313,25 +324,41 @@ def colours_of(lists: Lists, look: Look, g: float, kept: NDArray[np.int32], out:
 
 
 @njit(inline="always")
-def _exponents(
-    look: Look,
-    g: float,
-    rgba: NDArray[np.uint8],
-    depth: NDArray[np.float32],
-    front: NDArray[np.float64],
-    out: NDArray[np.float64],
-) -> None:
+def _exponents(lists: Lists, look: Look, g: float, p: int, kept: Kept, out: NDArray[np.float64]) -> None:
     """What `exp(-.)` of is a fragment's weight in the tail, float64 [n]."""
-    if not look.bins and look.tail != DENSITY:
+    if not look.bins and look.tail != _DENSITY:
         out[:] = 0.0
+        return
+    first, last = lists.offsets[p], lists.offsets[p + 1]
+    rgba, depth = lists.rgba[first:last], lists.depth[first:last]
+    if look.bins:
+        binned_exponents(_form(look), depth, rgba, lists.nearest[p], lists.extent[p], kept, out)
         return
     total = 0.0
     for i in range(len(rgba)):
         total += look.optical[rgba[i, 3]]
-    if look.bins:
-        binned_exponents(depth, rgba, total, front, out)
-        return
     extent = np.float64(depth[-1]) - np.float64(depth[0])
     steepness = g * total / extent if extent > 0.0 else 0.0
     for i in range(len(out)):
         out[i] = steepness * (np.float64(depth[i]) - np.float64(depth[0]))
+
+
+@njit(parallel=True, cache=True, error_model="numpy")
+def leave_cuts(lists: Lists, bins: int, other: np.float32, error: NDArray[np.float32]) -> None:
+    """Give every k that ends within a depth bin another error.
+
+    Args:
+        lists: The view.
+        bins: Of its tail.
+        other: The error.
+        error: float32 [N+P], changed.
+    """
+    offsets, depth = lists.offsets, lists.depth
+    for p in prange(len(offsets) - 1):
+        before = -1
+        for i in range(offsets[p], offsets[p + 1]):
+            place = place_of(depth[np.uint64(i)], lists.nearest[p], lists.extent[p], bins)
+            own = min(int(place), bins - 1)
+            if own == before:
+                error[i + p] = other
+            before = own

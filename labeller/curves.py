@@ -7,22 +7,27 @@ The compiled part is `labeller.curve_kernels`; all arithmetic is float64, and me
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labeller.curve_kernels import Lists, Look, colours_of, errors_of
-from renderer.depth_bins import OPTICAL
+from labeller.curve_kernels import Lists, Look, colours_of, errors_of, leave_cuts
+from renderer.depth_bins import OPTICAL, bin_form
+from renderer.tile_range import pixel_ranges
 from schemas.colour import decode_gamma2
 from schemas.fragments import FragmentDump
 from schemas.problem import ExitCode, Problem
-from schemas.tail import DEFAULT_TAIL, DENSITY_BINS, DENSITY_G, METRICS, TAILS, MetricName, TailName
+from schemas.tail import DEFAULT_TAIL, DENSITY_G, METRICS, TAILS, MetricName, TailName
 
 _CHUNKS: Final = 256  # more than threads, of equal numbers of fragments: crowded regions are shared out
 _LEVELS: Final = np.arange(256, dtype=np.float64) / 255.0
 _NOTHING: Final = np.empty(0, dtype=np.float64)
+
+
+UNREACHABLE: Final = 1e30
+"""Error of a k that no cut gives: above any other, and no hull reaches up to it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +120,7 @@ def _error_curves(
     steep = _checked_g(gs)
     offsets = dump.offsets + np.arange(dump.pixels + 1)
     error = np.empty((len(steep), dump.total + dump.pixels), dtype=np.float32)
-    errors_of(_lists(dump), _look(tail, metric), steep, _checked_weights(weights, dump.pixels), error)
+    errors_of(_lists(dump, tail), _look(tail, metric), steep, _checked_weights(weights, dump.pixels), error)
     return [
         Curves(offsets, e, tail, float(s) if tail == "density" else float(g), metric)
         for e, s in zip(error, steep, strict=True)
@@ -158,6 +163,18 @@ def _checked_weights(weights: NDArray[np.floating] | None, pixels: int) -> NDArr
     return w
 
 
+def whole_bins(dump: FragmentDump, curves: Curves) -> Curves:
+    """The same curves where a core is all fragments of a pixel's first depth bins: other k have the error UNREACHABLE.
+
+    Args:
+        dump: Fragments of the view.
+        curves: Of a tail with bins.
+    """
+    error = curves.error.copy()
+    leave_cuts(_lists(dump, curves.tail), TAILS[curves.tail].bins, np.float32(UNREACHABLE), error)
+    return replace(curves, error=error)
+
+
 def composite(
     dump: FragmentDump, k: NDArray[np.integer], tail: TailName = DEFAULT_TAIL, g: float = DENSITY_G
 ) -> NDArray[np.float32]:
@@ -179,7 +196,7 @@ def composite(
     (g,) = _checked_g((g,))
     out = np.empty((dump.pixels, 3), dtype=np.float32)
     kept = np.clip(np.asarray(k), 0, dump.counts).astype(np.int32)
-    colours_of(_lists(dump), _look(tail, "linear"), float(g), kept, out)
+    colours_of(_lists(dump, tail), _look(tail, "linear"), float(g), kept, out)
     return out
 
 
@@ -211,12 +228,17 @@ def check_dump(dump: FragmentDump) -> None:
         )
 
 
-def _lists(dump: FragmentDump) -> Lists:
+def _lists(dump: FragmentDump, tail: TailName) -> Lists:
     work = dump.offsets + np.arange(dump.pixels + 1)
     chunks = np.searchsorted(work, np.linspace(0, work[-1], _CHUNKS + 1)).astype(np.int64)
-    return Lists(dump.offsets, dump.rgba, dump.depth, dump.background, chunks)
+    nearest = extent = np.empty(0, dtype=np.float32)
+    if TAILS[tail].bins:
+        ranges = pixel_ranges(dump)
+        nearest, extent = ranges.nearest, ranges.extent
+    return Lists(dump.offsets, dump.rgba, dump.depth, dump.background, nearest, extent, chunks)
 
 
 def _look(tail: TailName, metric: MetricName) -> Look:
     decode = _LEVELS if metric == "paper" else decode_gamma2(np.arange(256, dtype=np.uint8))
-    return Look(TAILS.index(tail), DENSITY_BINS.get(tail, 0), METRICS.index(metric), decode, _LEVELS, OPTICAL)
+    row = TAILS[tail]
+    return Look(int(row.kind), *bin_form(row), METRICS.index(metric), decode, _LEVELS, OPTICAL)

@@ -98,7 +98,6 @@ class Labels(BaseModel):
         tail: Tail of the error curves.
         g: Steepness of the density tail.
         metric: Space of the error.
-        k_min: First k of the hulls.
         weights: What the errors of a pixel count.
     """
 
@@ -107,7 +106,6 @@ class Labels(BaseModel):
     tail: TailName
     g: float
     metric: MetricName
-    k_min: int
     weights: PixelWeights = DEFAULT_WEIGHTS
 
     @model_serializer(mode="wrap")
@@ -118,7 +116,7 @@ class Labels(BaseModel):
     @classmethod
     def of(cls, meta: ShardMeta) -> Labels:
         """Those of a shard."""
-        return cls(tail=meta.tail, g=meta.g, metric=meta.metric, k_min=meta.k_min, weights=meta.weights)
+        return cls(tail=meta.tail, g=meta.g, metric=meta.metric, weights=meta.weights)
 
 
 class DatasetIndex(BaseModel):
@@ -187,7 +185,7 @@ def write_index(folder: Path, members: Sequence[Member], code: str) -> DatasetIn
         if made != first:
             raise Problem(
                 f"{members[0].file} and {member.file} are not labelled in the same way.",
-                "Make the labels of both with the same tail, g, metric, k_min and sampling.",
+                "Make the labels of both with the same tail, g, metric and sampling.",
             )
     count_type: CountType = "uint32" if "uint32" in {found for *_, found in read} else "uint16"
     index = DatasetIndex(

@@ -87,7 +87,7 @@ def descend(part: Part, end: Threshold, left: int) -> Descent:
         left: Fragments that steps equal to the threshold may take; they get them by pixel index.
     """
     hulls, pixels = part.hulls, len(part.hulls.offsets) - 1
-    steps = _Steps(part.curves.offsets, hulls.offsets, hulls.k, hulls.error, part.keys, hulls.k_min)
+    steps = _Steps(part.curves.offsets, hulls.offsets, hulls.k, hulls.error, part.keys)
     k, flags = np.empty(pixels, dtype=np.int32), np.zeros(pixels, dtype=np.uint8)
     error, dual, counts = np.zeros(_CHUNKS), np.zeros((_CHUNKS, 2)), np.zeros((_CHUNKS, 2), dtype=np.int64)
     _walk(part.chunks, steps, (end.key, end.first, end.last, slope_of(end.key)), k, flags, error, dual, counts)
@@ -109,8 +109,7 @@ def core_of(part: Part, pixels: NDArray[np.int64], k: NDArray[np.int32]) -> Core
     sizes = curves.offsets[pixels + 1] - first
     offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
     where = np.arange(offsets[-1]) + np.repeat(first - offsets[:-1], sizes)
-    least = np.minimum(sizes - 1, part.hulls.k_min).astype(np.int32)
-    return Core(offsets, curves.error[where], k[pixels], least)
+    return Core(offsets, curves.error[where], k[pixels])
 
 
 class _Steps(NamedTuple):
@@ -119,7 +118,6 @@ class _Steps(NamedTuple):
     vertex: NDArray[np.int32]
     error: NDArray[np.float32]
     keys: NDArray[np.uint32]
-    k_min: int
 
 
 @njit(parallel=True, cache=True, error_model="numpy")
@@ -140,8 +138,7 @@ def _walk(
         for p in range(chunks[chunk], chunks[chunk + 1]):
             begin, after = steps.offsets[p], steps.offsets[p + 1]
             if begin == after:  # exact whatever it gets: it takes no part
-                k[p] = min(steps.k_min, steps.curve_offsets[p + 1] - steps.curve_offsets[p] - 1)
-                fragments += k[p]
+                k[p] = 0
                 continue
             chosen, cheapest, flag = begin, begin, np.uint8(0)
             for i in range(begin, after):

@@ -1,5 +1,8 @@
 """Algorithm 1 of DHOIT without its heap, and its variant by increments (METHOD section 3).
 
+Algorithm 1 is the oracle that errors are given relative to, so it stays as its authors have it: it alone keeps
+`DHOIT_K_MIN` fragments of every occupied pixel, where the budget covers that.
+
 A pixel's key is not pushed before its earlier ones are popped, so the heap pops in the order of
 `(largest key of the pixel so far, pixel, step)`. The running maximum does not fall along a pixel's removals;
 so the first R removals are those below one threshold, plus ties by pixel index: one selection a budget.
@@ -8,7 +11,7 @@ so the first R removals are those below one threshold, plus ties by pixel index:
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -18,6 +21,8 @@ from labeller.curves import Curves
 from labeller.selection import LAST_KEY, Histogram, Threshold, ascending_keys
 
 RemovalName = Literal["greedy", "increment"]
+DHOIT_K_MIN: Final = 1
+"""Fewest fragments that Algorithm 1 leaves an occupied pixel."""
 _NO_WEIGHTS = np.empty(0, dtype=np.int32)
 
 
@@ -26,26 +31,37 @@ class RemovalKeys(NamedTuple):
 
     Attributes:
         offsets: int64 [P+1].
-        keys: uint32 [N], not rising within a pixel; `LAST_KEY` where k_min forbids the removal.
+        keys: uint32 [N], not rising within a pixel; `LAST_KEY` where the removal is forbidden.
     """
 
     offsets: NDArray[np.int64]
     keys: NDArray[np.uint32]
 
 
-def removal_keys(curves: Curves, k_min: int, key: RemovalName) -> RemovalKeys:
+def least_kept(key: RemovalName, occupied: int, budget: int) -> int:
+    """Fewest fragments that a rule leaves an occupied pixel.
+
+    Args:
+        key: The rule.
+        occupied: Pixels with fragments.
+        budget: F.
+    """
+    return DHOIT_K_MIN if key == "greedy" and budget >= DHOIT_K_MIN * occupied else 0
+
+
+def removal_keys(curves: Curves, least: int, key: RemovalName) -> RemovalKeys:
     """The order in which the fragments of some pixels are removed.
 
     Args:
         curves: Error curves of the pixels.
-        k_min: 0 or 1; no pixel goes below `min(k_min, n)`.
+        least: No pixel goes below `min(least, n)`.
         key: `greedy`: the error after the removal, as Algorithm 1 is printed; `increment`: by how much it grows.
     """
     offsets = curves.offsets - np.arange(len(curves.offsets))
     values = np.empty(offsets[-1], dtype=np.float32)
-    _running_maxima(offsets, curves.error, k_min, key == "increment", values)
+    _running_maxima(offsets, curves.error, key == "increment", values)
     keys = ascending_keys(values)
-    _forbid(offsets, k_min, keys)
+    _forbid(offsets, least, keys)
     return RemovalKeys(offsets, keys)
 
 
@@ -65,7 +81,7 @@ class Removals:
         """What is kept once no more fragments are left than a budget allows; equal to the literal heap, ties included.
 
         Args:
-            budgets: F, at least `sum min(k_min, n)`.
+            budgets: F, at least `sum min(least, n)` of the keys.
 
         Returns:
             int32 [P] for each budget.
@@ -94,7 +110,7 @@ def _keep(part: RemovalKeys, end: Threshold, left: int) -> tuple[NDArray[np.int3
 
 @njit(parallel=True, cache=True)
 def _running_maxima(
-    offsets: NDArray[np.int64], error: NDArray[np.float32], k_min: int, increments: bool, out: NDArray[np.float32]
+    offsets: NDArray[np.int64], error: NDArray[np.float32], increments: bool, out: NDArray[np.float32]
 ) -> None:
     for p in prange(len(offsets) - 1):
         first = offsets[p]
@@ -107,9 +123,9 @@ def _running_maxima(
 
 
 @njit(parallel=True, cache=True)
-def _forbid(offsets: NDArray[np.int64], k_min: int, keys: NDArray[np.uint32]) -> None:
+def _forbid(offsets: NDArray[np.int64], least: int, keys: NDArray[np.uint32]) -> None:
     for p in prange(len(offsets) - 1):
-        for i in range(offsets[p], min(offsets[p] + k_min, offsets[p + 1])):
+        for i in range(offsets[p], min(offsets[p] + least, offsets[p + 1])):
             keys[i] = LAST_KEY
 
 

@@ -15,20 +15,18 @@ from labeller.curves import Curves
 class Hulls:
     """Hull vertices of all pixels that can gain; those of pixel p are `offsets[p]:offsets[p+1]`.
 
-    A pixel's first vertex is at `k_min`, its last one where the error first is 0. Pixels with `n <= k_min`, and
-    those that are exact at `k_min` already, have no vertices: they take no part.
+    A pixel's first vertex is at k = 0, its last one where the error first is 0. Empty pixels, and those that are exact
+    at k = 0 already, have no vertices: they take no part.
 
     Attributes:
         offsets: int64 [P+1].
         k: int32 [M], ascending within a pixel.
         error: float32 [M], falling within a pixel, ever more slowly.
-        k_min: Fewest core fragments of a pixel that has any.
     """
 
     offsets: NDArray[np.int64]
     k: NDArray[np.int32]
     error: NDArray[np.float32]
-    k_min: int
 
     def steps(self) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """Of the step that leads to each vertex from the one before it.
@@ -42,38 +40,36 @@ class Hulls:
         return slopes, lengths
 
 
-def lower_hulls(curves: Curves, k_min: int) -> Hulls:
-    """Hulls of the curves on `k_min..n`; their trailing flat part (error 0) is dropped.
+def lower_hulls(curves: Curves) -> Hulls:
+    """Hulls of the curves on `0..n`; their trailing flat part (error 0) is dropped.
 
     Args:
         curves: Error curves of a view.
-        k_min: 0 or 1, fewest core fragments of an occupied pixel.
     """
     scratch = np.empty(len(curves.error), dtype=np.int32)
     sizes = np.zeros(len(curves.offsets) - 1, dtype=np.int64)
-    _hulls(curves.offsets, curves.error, k_min, scratch, sizes)
+    _hulls(curves.offsets, curves.error, scratch, sizes)
     offsets = np.concatenate([np.zeros(1, np.int64), np.cumsum(sizes)])
     k, error = np.empty(offsets[-1], dtype=np.int32), np.empty(offsets[-1], dtype=np.float32)
     _compact(curves.offsets, curves.error, scratch, offsets, k, error)
-    return Hulls(offsets, k, error, k_min)
+    return Hulls(offsets, k, error)
 
 
 @njit(parallel=True, cache=True, error_model="numpy")
 def _hulls(
     offsets: NDArray[np.int64],
     error: NDArray[np.float32],
-    k_min: int,
     scratch: NDArray[np.int32],
     sizes: NDArray[np.int64],
 ) -> None:
     for p in prange(len(sizes)):
         first = offsets[p]
         n = offsets[p + 1] - first - 1
-        if n <= k_min or error[first + k_min] == 0.0:
+        if error[first] == 0.0:  # an empty pixel's one entry, too
             continue
         stack = scratch[first : first + n + 1]
         size = 0
-        for k in range(k_min, n + 1):
+        for k in range(n + 1):
             e = np.float64(error[first + k])
             while size >= 2:
                 i, j = stack[size - 2], stack[size - 1]

@@ -49,7 +49,7 @@ class Split(BaseModel):
         shards: Number of shards; each is a view.
         assets: Names of its assets.
         rows: Sampled pixels.
-        exact_rows: Those already exact at k_min, without a segment.
+        exact_rows: Those exact at k = 0, without a segment.
         segments: Hull segments.
         fragments: N, over its views.
         bytes: Of its files.

@@ -63,35 +63,28 @@ class _State:
 
 
 class LagrangianAllocator:
-    """Optimal allocations of a view for any number of budgets with the same k_min.
+    """Optimal allocations of a view for any number of budgets.
 
     Args:
         parts: Gives the view's pixels, in one part or in several one after the other; called anew for each pass.
-        k_min: 0 or 1, that of the parts' hulls.
     """
 
-    def __init__(self, parts: Callable[[], Iterable[Part]], k_min: int) -> None:
-        self._parts, self._k_min, self._least = parts, k_min, 0
-
-        def counted() -> Iterable[Items]:
-            for part in parts():
-                self._least += int(np.minimum(part.curves.counts, k_min).sum())
-                yield part.keys, part.lengths
-
-        self._histogram = Histogram(counted())
+    def __init__(self, parts: Callable[[], Iterable[Part]]) -> None:
+        self._parts = parts
+        self._histogram = Histogram((part.keys, part.lengths) for part in parts())
 
     def allocate(self, budgets: Sequence[int]) -> list[Allocation]:
         """The best allocation within each budget, with its bound.
 
         Args:
-            budgets: F, at least `sum min(k_min, n)`.
+            budgets: F >= 0.
         """
         found: dict[int, Allocation] = {}
         open_ = list(dict.fromkeys(budgets))
         for around in _AROUND:
             states = self._descended(open_, around) if open_ else []
             for state in states:
-                made, known = _finished(state, self._k_min), found.get(state.budget)
+                made, known = _finished(state), found.get(state.budget)
                 if known is None or made.proven or made.error < known.error:
                     found[state.budget] = made
             # A window that has more pixels than can be looked at is not made larger.
@@ -99,16 +92,11 @@ class LagrangianAllocator:
         return [found[budget] for budget in budgets]
 
     def _descended(self, budgets: Sequence[int], around: int) -> list[_State]:
-        spend = [budget - self._least for budget in budgets]
-
         def items() -> Iterable[Items]:
             return ((part.keys, part.lengths) for part in self._parts())
 
-        ends = self._histogram.thresholds(spend, items, around)
-        states = [
-            _State(budget, _widened(end), left - end.below)
-            for budget, end, left in zip(budgets, ends, spend, strict=True)
-        ]
+        ends = self._histogram.thresholds(budgets, items, around)
+        states = [_State(budget, _widened(end), budget - end.below) for budget, end in zip(budgets, ends, strict=True)]
         for part in self._parts():
             for state in states:
                 _go_on(state, part)
@@ -140,7 +128,7 @@ def _go_on(state: _State, part: Part) -> None:
     state.error.append(float(part.curves.error[part.curves.offsets[others] + here.k[others]].sum(dtype=np.float64)))
 
 
-def _finished(state: _State, k_min: int) -> Allocation:
+def _finished(state: _State) -> Allocation:
     core, lam = _joined([core for _, core in state.core]), slope_of(state.end.key)
     core_k, proven = core.base, True
     if lam > 0.0:
@@ -160,7 +148,7 @@ def _finished(state: _State, k_min: int) -> Allocation:
     k = np.concatenate([np.empty(0, np.int32), *state.k]) if len(state.k) != 1 else state.k[0]
     gap = (error - bound) / error if error > 0.0 else 0.0
     used = int(k.sum(dtype=np.int64))
-    return Allocation("optimal", state.budget, k, used, error, k_min, False, bound, gap, lam, proven)
+    return Allocation("optimal", state.budget, k, used, error, False, bound, gap, lam, proven)
 
 
 def _margin(state: _State) -> float:
@@ -182,5 +170,4 @@ def _joined(cores: Sequence[Core]) -> Core:
         np.concatenate([*offsets, ends[-1:]]).astype(np.int64),
         np.concatenate([np.empty(0, np.float32), *(core.error for core in cores)]),
         np.concatenate([np.empty(0, np.int32), *(core.base for core in cores)]),
-        np.concatenate([np.empty(0, np.int32), *(core.least for core in cores)]),
     )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from labeller.reference import Pixel, tail_weights
 from schemas.colour import linear_to_srgb
-from schemas.tail import DENSITY_G, MetricName, TailName
+from schemas.tail import DENSITY_G, TAILS, MetricName, TailKind, TailName
 
 _ROUNDING = 1e-24
 """Squared differences below this are the rounding of sums, as in `labeller.curve_kernels`."""
@@ -36,7 +36,7 @@ def colours(pixel: Pixel, tail: TailName, g: float = DENSITY_G) -> NDArray[np.fl
     total, mean = _from_behind(weight), _from_behind(weight[:, None] * pixel.colour)
     mean /= np.where(total > 0.0, total, 1.0)[:, None]
     through = _behind(pixel, tail)
-    opacity = np.where(total > 0.0, 1.0 if tail == "paper" else 1.0 - through, 0.0)
+    opacity = np.where(total > 0.0, 1.0 if TAILS[tail].kind == TailKind.PAPER else 1.0 - through, 0.0)
     through = np.where(total > 0.0, through, 1.0)
     behind = opacity[:, None] * mean + through[:, None] * pixel.background
     return np.asarray(core + passes[:, None] * behind)
@@ -54,18 +54,17 @@ def errors(found: NDArray[np.float64], metric: MetricName = "display") -> NDArra
     return np.where(squared > _ROUNDING, squared, 0.0).astype(np.float32)
 
 
-def hull(error: NDArray[np.float32], k_min: int = 1) -> list[int]:
-    """Vertices k of the lower hull of a curve on k_min..n, without its flat end; empty if the pixel cannot gain.
+def hull(error: NDArray[np.float32]) -> list[int]:
+    """Vertices k of the lower hull of a curve on 0..n, without its flat end; empty if the pixel cannot gain.
 
     Args:
         error: `e_p(k)`, float32 [n+1].
-        k_min: 0 or 1.
     """
     values = error.astype(np.float64).tolist()
     stack: list[int] = []
-    if len(values) - 1 <= k_min or values[k_min] == 0.0:
+    if values[0] == 0.0:
         return stack
-    for k in range(k_min, len(values)):
+    for k in range(len(values)):
         while len(stack) >= 2:
             i, j = stack[-2:]
             if (values[i] - values[j]) * (k - j) > (values[j] - values[k]) * (j - i):
@@ -79,7 +78,7 @@ def hull(error: NDArray[np.float32], k_min: int = 1) -> list[int]:
 
 def _behind(pixel: Pixel, tail: TailName) -> NDArray[np.float64]:
     """float64 [n+1]: what passes the tail behind the first k fragments."""
-    if tail in ("weighted-average", "paper"):
+    if TAILS[tail].kind in (TailKind.WEIGHTED_AVERAGE, TailKind.PAPER):
         count = np.arange(pixel.n, -1, -1)
         mean = _from_behind(pixel.alpha) / np.maximum(count, 1)
         return np.asarray(np.maximum(1.0 - mean, 0.0) ** count)

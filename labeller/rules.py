@@ -15,7 +15,6 @@ from labeller.descent import Part, part_of
 from labeller.error_rules import allocate_by_error
 from labeller.hull import Hulls, lower_hulls
 from renderer.allocation.dynamic import dynamic
-from renderer.allocation.fill import feasible_k_min
 from renderer.allocation.importance import VkbOptions
 from schemas.fragments import FragmentDump
 
@@ -30,7 +29,6 @@ def allocate_curves(
     hulls: Hulls | None = None,
     vkb: VkbOptions = _VKB,
     fill: FillName = "exact",
-    k_min: int = 1,
 ) -> list[Allocation]:
     """Core fragments of every pixel, for each budget. Budgets share everything that does not depend on them.
 
@@ -39,10 +37,9 @@ def allocate_curves(
         curves: Its error curves.
         budgets: Fragment counts F >= 0, in any order. F >= N gives k = n, flagged `exact`.
         rule: One of `labeller.allocation.RULES`.
-        hulls: The curves' hulls, if the caller has them (rule `optimal`); made here for another k_min.
+        hulls: The curves' hulls, if the caller has them (rule `optimal`); else they are made here.
         vkb: Factors of rule `importance`.
         fill: How the rules `importance`, `uniform` and `proportional` come from weights to counts.
-        k_min: Fewest fragments of an occupied pixel: 1 (or 0, where a budget does not cover that), or always 0.
 
     Returns:
         One allocation for each budget, in the order of `budgets`.
@@ -52,27 +49,25 @@ def allocate_curves(
     """
     n = dump.counts
 
-    def short(wanted: list[int], least: int) -> list[Allocation]:
-        return _short(dump, curves, wanted, rule, least, hulls, vkb, fill)
+    def short(wanted: list[int]) -> list[Allocation]:
+        return _short(dump, curves, wanted, rule, hulls, vkb, fill)
 
-    return each_budget(n, budgets, rule, k_min, short)
+    return each_budget(n, budgets, rule, short)
 
 
 def each_budget(
     n: NDArray[np.integer],
     budgets: Sequence[int],
     rule: RuleName,
-    k_min: int,
-    short: Callable[[list[int], int], list[Allocation]],
+    short: Callable[[list[int]], list[Allocation]],
 ) -> list[Allocation]:
-    """Allocations in the order of the budgets; those below N that share k_min are made together, equal ones once.
+    """Allocations in the order of the budgets; those below N are made together, equal ones once.
 
     Args:
         n: [P], fragments of each pixel.
         budgets: F, in any order.
         rule: Rule that makes them.
-        k_min: 0 or 1; where a budget does not cover 1 it is 0.
-        short: Makes the allocations of budgets below N, of which no two are equal, with a k_min that they cover.
+        short: Makes the allocations of budgets below N, of which no two are equal.
 
     Raises:
         ValueError: If a budget is negative.
@@ -80,24 +75,17 @@ def each_budget(
     if any(budget < 0 for budget in budgets):
         raise ValueError("a budget cannot be negative")
     total = int(n.sum(dtype=np.int64))
-    results: dict[int, Allocation] = {}
-    wanted: dict[int, list[int]] = {0: [], 1: []}
-    for budget in dict.fromkeys(budgets):
-        least = min(k_min, feasible_k_min(n, budget))
-        if budget >= total:
-            results[budget] = _everything(rule, budget, n, least)
-        else:
-            wanted[least].append(budget)
-    for least, below in wanted.items():
-        results.update((made.budget, made) for made in (short(below, least) if below else ()))
+    results = {budget: _everything(rule, budget, n) for budget in budgets if budget >= total}
+    below = [budget for budget in dict.fromkeys(budgets) if budget < total]
+    results |= {made.budget: made for made in (short(below) if below else ())}
     return [results[budget] for budget in budgets]
 
 
-def _everything(rule: RuleName, budget: int, n: NDArray[np.integer], k_min: int) -> Allocation:
+def _everything(rule: RuleName, budget: int, n: NDArray[np.integer]) -> Allocation:
     k, used = n.astype(np.int32), int(n.sum(dtype=np.int64))
     if rule == "optimal":
-        return Allocation(rule, budget, k, used, 0.0, k_min, True, 0.0, 0.0, 0.0, True)
-    return Allocation(rule, budget, k, used, 0.0, k_min, True)
+        return Allocation(rule, budget, k, used, 0.0, True, 0.0, 0.0, 0.0, True)
+    return Allocation(rule, budget, k, used, 0.0, True)
 
 
 def _short(
@@ -105,21 +93,20 @@ def _short(
     curves: Curves,
     budgets: Sequence[int],
     rule: RuleName,
-    k_min: int,
     hulls: Hulls | None,
     vkb: VkbOptions,
     fill: FillName,
 ) -> list[Allocation]:
-    """Allocations of budgets below N that share k_min."""
+    """Allocations of budgets below N."""
     if rule in ("optimal", "greedy", "increment"):
         parts: tuple[Part, ...] = ()
         if rule == "optimal":
-            fits = hulls is not None and hulls.k_min == k_min
-            parts = (part_of(curves, hulls if hulls is not None and fits else lower_hulls(curves, k_min)),)
-        return allocate_by_error(rule, budgets, k_min, lambda: (curves,), lambda: parts, keep=True)
+            parts = (part_of(curves, lower_hulls(curves) if hulls is None else hulls),)
+        occupied = int(np.count_nonzero(dump.counts))
+        return allocate_by_error(rule, budgets, occupied, lambda: (curves,), lambda: parts, keep=True)
     if rule in ("fixed", "dynamic"):
         counts = [(fixed if rule == "fixed" else dynamic)(dump.counts, budget) for budget in budgets]
     else:
         assert rule in ("importance", "uniform", "proportional")
-        counts = [weighted(dump, rule, budget, k_min, vkb, fill) for budget in budgets]
-    return [measured(rule, F, k, curves, k_min) for F, k in zip(budgets, counts, strict=True)]
+        counts = [weighted(dump, rule, budget, vkb, fill) for budget in budgets]
+    return [measured(rule, F, k, curves) for F, k in zip(budgets, counts, strict=True)]

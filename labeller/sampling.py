@@ -17,7 +17,7 @@ class Sampling(BaseModel):
 
     Attributes:
         kind: `stratified`: the same share of every n; `uniform`: every pixel with the same probability (DHOIT).
-        fraction: Share of the pixels with more than k_min fragments.
+        fraction: Share of the pixels with fragments.
         seed: Equal seeds give equal samples.
     """
 

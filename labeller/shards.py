@@ -35,7 +35,7 @@ from renderer.features import derive, gather
 from schemas.fragments import FragmentDump
 from schemas.pixel_weights import DEFAULT_WEIGHTS, PixelWeights, without_default
 from schemas.problem import ExitCode, Problem
-from schemas.tail import DENSITY_BINS, MetricName, TailName
+from schemas.tail import MetricName, TailName
 
 SHARES: Final = (0.05, 0.1, 0.25, 0.4, 0.6, 0.8, 0.9)
 """Budgets, as shares of the view's fragments, at which every shard knows the price."""
@@ -51,7 +51,6 @@ class Level(BaseModel):
         budget: F, fragments.
         share: F / N.
         scored: Whether F is one of the budgets that results are measured at.
-        k_min: Fewest fragments of an occupied pixel at this budget.
         log_lambda: Natural logarithm of the error saved per fragment where the budget is used up; None where
             less than the budget suffices.
         error: Total squared error of the view.
@@ -63,7 +62,6 @@ class Level(BaseModel):
     budget: int
     share: float = Field(ge=0.0, le=1.0)
     scored: bool
-    k_min: int
     log_lambda: float | None
     error: float
     bound: float
@@ -76,12 +74,10 @@ class ShardMeta(BaseModel):
         width: Pixels per row.
         height: Rows.
         fragments: N.
-        occupied: Pixels with at least one fragment.
-        eligible: Pixels with more than k_min fragments, of which the rows are a sample.
+        occupied: Pixels with at least one fragment, of which the rows are a sample.
         tail: Tail of the error curves.
         g: Steepness of the density tail.
         metric: Space of the error.
-        k_min: First k of the hulls.
         weights: What the errors of a pixel count, in its hull and in the levels.
         sampling: How the rows were drawn.
         levels: Optimal allocations, by rising budget.
@@ -93,11 +89,9 @@ class ShardMeta(BaseModel):
     height: int = Field(ge=1)
     fragments: int = Field(ge=0)
     occupied: int
-    eligible: int
     tail: TailName
     g: float
     metric: MetricName
-    k_min: int = Field(ge=0, le=1)
     weights: PixelWeights = DEFAULT_WEIGHTS
     sampling: Sampling
     levels: tuple[Level, ...]
@@ -117,7 +111,7 @@ class Shard:
         n: int32 [R], fragments.
         pixel: int32 [R], pixel index in the view, ascending.
         hull_offsets: int64 [R+1], hull vertices of row r are `hull_offsets[r]:hull_offsets[r+1]`.
-        hull_k: int32 [M], from k_min, ascending.
+        hull_k: int32 [M], from 0, ascending.
         hull_error: float32 [M], falling to 0.
         meta: The view.
     """
@@ -129,11 +123,6 @@ class Shard:
     hull_k: NDArray[np.int32]
     hull_error: NDArray[np.float32]
     meta: ShardMeta
-
-    @property
-    def k_min(self) -> int:
-        """First k of the hulls."""
-        return self.meta.k_min
 
     @property
     def segments(self) -> int:
@@ -153,8 +142,8 @@ class Shard:
 
     @property
     def sampled_pixels(self) -> float:
-        """Pixels of the image that the rows stand for: W*H times the share of eligible pixels that was sampled."""
-        return self.meta.width * self.meta.height * len(self.n) / max(self.meta.eligible, 1)
+        """Pixels of the image that the rows stand for: W*H times the share of occupied pixels that was sampled."""
+        return self.meta.width * self.meta.height * len(self.n) / max(self.meta.occupied, 1)
 
 
 def write_shard(
@@ -176,7 +165,7 @@ def write_shard(
         curves: Its error curves, weighted already.
         hulls: The curves' hulls.
         budgets: Fragment counts F that results are measured at; those of N and above are left out.
-        fraction: Share of the pixels with more than k_min fragments that become rows.
+        fraction: Share of the pixels with fragments that become rows.
         seed: Seed of the sample.
         kind: `stratified`: the same share of every n; `uniform`: the same probability for every pixel, as in DHOIT.
         weights: What the errors in `curves` were weighted with.
@@ -185,25 +174,22 @@ def write_shard(
         Sums and size, for the index of a data set.
     """
     sampling = Sampling(kind=kind, fraction=fraction, seed=seed)
-    # Pixels that are exact at k_min gain nothing, but a predictor meets them in every frame: rows without a segment.
-    eligible = np.flatnonzero(dump.counts > hulls.k_min)
+    # Pixels that are exact at k = 0 gain nothing, but a predictor meets them in every frame: rows without a segment.
+    occupied = np.flatnonzero(dump.counts)
     meta = ShardMeta(
         width=dump.width,
         height=dump.height,
         fragments=dump.total,
-        occupied=int(np.count_nonzero(dump.counts)),
-        eligible=len(eligible),
+        occupied=len(occupied),
         tail=curves.tail,
         g=curves.g,
         metric=curves.metric,
-        k_min=hulls.k_min,
         weights=weights,
         sampling=sampling,
         levels=_levels(dump, curves, hulls, budgets),
     )
-    columns = _columns(
-        dump, DENSITY_BINS.get(curves.tail, 0), hulls, sample_pixels(eligible, dump.counts[eligible], sampling)
-    )
+    sampled = sample_pixels(occupied, dump.counts[occupied], sampling)
+    columns = _columns(dump, curves.tail, hulls, sampled)
     return write_columns(path, columns, meta.model_dump(mode="json"))
 
 
@@ -297,9 +283,9 @@ def _check_values(shard: Shard) -> None:
         "pixels that the view does not have": (np.diff(shard.pixel) > 0).all()
         and shard.pixel.min(initial=0) >= 0
         and shard.pixel.max(initial=0) < meta.width * meta.height,
-        "counts that the view does not have": shard.n.min(initial=meta.k_min + 1) > meta.k_min
+        "counts that the view does not have": shard.n.min(initial=1) > 0
         and int(shard.n.sum(dtype=np.int64)) <= meta.fragments,
-        "hulls that are not in k_min..n": (np.diff(shard.hull_k)[inner] > 0).all()
+        "hulls that are not in 0..n": (np.diff(shard.hull_k)[inner] > 0).all()
         and (shard.hull_k[last] <= shard.n[has_hull]).all(),
         "errors that do not fall to 0": np.isfinite(shard.hull_error).all()
         and (np.diff(shard.hull_error)[inner] < 0.0).all(),
@@ -309,7 +295,7 @@ def _check_values(shard: Shard) -> None:
         raise Damage(f"it has {', '.join(wrong)}")
 
 
-def _columns(dump: FragmentDump, bins: int, hulls: Hulls, pixel: NDArray[np.int64]) -> Columns:
+def _columns(dump: FragmentDump, tail: TailName, hulls: Hulls, pixel: NDArray[np.int64]) -> Columns:
     """What the file holds of the rows: of each hull segment its length, and the error at its start."""
     vertices = np.diff(hulls.offsets)[pixel]
     segments = np.maximum(vertices - 1, 0)
@@ -319,7 +305,7 @@ def _columns(dump: FragmentDump, bins: int, hulls: Hulls, pixel: NDArray[np.int6
     n = dump.counts[pixel]
     count = np.uint16 if n.max(initial=0) < 1 << 16 else np.uint32
     return {
-        "features": derive(gather(dump, bins)[pixel]),
+        "features": derive(gather(dump, tail)[pixel]),
         "n": n.astype(count),
         "pixel": pixel.astype(np.uint32),
         "hull_segments": segments.astype(count),
@@ -340,7 +326,7 @@ def _shard(columns: Columns, meta: ShardMeta) -> Shard:
     step = np.zeros(offsets[-1] + 1, dtype=np.int64)
     step[1:][starts] = columns["hull_length"]
     k = np.cumsum(step)[:-1]
-    k += meta.k_min - np.repeat(k[offsets[:-1][has_hull]], segments[has_hull] + 1)
+    k -= np.repeat(k[offsets[:-1][has_hull]], segments[has_hull] + 1)
     return Shard(
         features=columns["features"].astype(np.float32, copy=False),
         n=columns["n"].astype(np.int32),
@@ -355,15 +341,13 @@ def _shard(columns: Columns, meta: ShardMeta) -> Shard:
 def _levels(dump: FragmentDump, curves: Curves, hulls: Hulls, budgets: Sequence[int]) -> tuple[Level, ...]:
     scored = {int(budget) for budget in budgets}
     usable = int(hulls.steps()[1].sum(dtype=np.int64))
-    last = int(np.minimum(dump.counts, hulls.k_min).sum()) + int(LAST_SHARE * usable)
-    wanted = (*(int(share * dump.total) for share in SHARES), last, *scored)
+    wanted = (*(int(share * dump.total) for share in SHARES), int(LAST_SHARE * usable), *scored)
     short = [budget for budget in needed_budgets(wanted, dump.total) if budget > 0]
     return tuple(
         Level(
             budget=found.budget,
             share=found.budget / dump.total,
             scored=found.budget in scored,
-            k_min=found.k_min,
             log_lambda=math.log(found.lam) if found.lam else None,
             error=found.error,
             bound=found.bound or 0.0,

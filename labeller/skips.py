@@ -8,20 +8,17 @@ import numpy as np
 
 from labeller.hull import Hulls
 from schemas.fragments import FragmentDump
-from schemas.skips import COMPLETE_BUDGETS, COVERED_PIXELS, EXACT_PIXELS, REPEATED_BUDGETS
+from schemas.skips import COMPLETE_BUDGETS, EXACT_PIXELS, REPEATED_BUDGETS
 
 
 def pixel_skips(dump: FragmentDump, hulls: Hulls) -> dict[str, int]:
-    """Pixels with fragments that take no part in allocations at the hulls' k_min.
+    """Pixels with fragments that take no part in allocations: they are exact without a core fragment.
 
     Args:
         dump: Fragments of a view.
         hulls: Hulls of its error curves.
     """
-    occupied = dump.counts > 0
-    covered = occupied & (dump.counts <= hulls.k_min)
-    exact = occupied & ~covered & (np.diff(hulls.offsets) == 0)
-    return {COVERED_PIXELS: int(np.count_nonzero(covered)), EXACT_PIXELS: int(np.count_nonzero(exact))}
+    return {EXACT_PIXELS: int(np.count_nonzero((dump.counts > 0) & (np.diff(hulls.offsets) == 0)))}
 
 
 def needed_budgets(budgets: Sequence[int], total: int) -> tuple[int, ...]:

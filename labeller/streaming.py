@@ -33,7 +33,6 @@ def allocate_bands(
     tail: TailName = DEFAULT_TAIL,
     g: float = DENSITY_G,
     metric: MetricName = "display",
-    k_min: int = 1,
 ) -> list[Allocation]:
     """Core fragments of every pixel, for each budget; memory is that of one band and of the results.
 
@@ -44,7 +43,6 @@ def allocate_bands(
         tail: Tail that stands for the fragments beyond k.
         g: Steepness of the density tail.
         metric: Space of the error.
-        k_min: Fewest fragments of an occupied pixel: 1 (or 0, where a budget does not cover that), or always 0.
 
     Returns:
         One allocation for each budget, in the order of `budgets`; k is that of all bands, one after the other.
@@ -61,10 +59,10 @@ def allocate_bands(
     def curves() -> Iterator[Curves]:
         return (error_curves(band, tail, g, metric) for band in bands())
 
-    def short(wanted: list[int], least: int) -> list[Allocation]:
+    def short(wanted: list[int]) -> list[Allocation]:
         def parts() -> Iterator[Part]:
-            return (part_of(part, lower_hulls(part, least)) for part in curves())
+            return (part_of(part, lower_hulls(part)) for part in curves())
 
-        return allocate_by_error(rule, wanted, least, curves, parts, keep=False)
+        return allocate_by_error(rule, wanted, int(np.count_nonzero(n)), curves, parts, keep=False)
 
-    return each_budget(n, budgets_of(budgets), rule, k_min, short)
+    return each_budget(n, budgets_of(budgets), rule, short)

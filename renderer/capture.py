@@ -62,6 +62,7 @@ def capture(frame: Frame) -> Captured:
     bands = [band for row in range(0, frame.height, rows) for band in appender.rows(row, min(rows, frame.height - row))]
     with appender.clock.measure("readback"):
         background = _background(frame)
+        tile_range = np.frombuffer(frame.tile_range().read(), dtype=np.float32).reshape(-1, 2)
     dump = FragmentDump(
         width=frame.width,
         height=frame.height,
@@ -70,8 +71,9 @@ def capture(frame: Frame) -> Captured:
         depth=_joined([band.depth for band in bands]),
         background=background,
         facing=_joined([band.facing for band in bands]),
+        tile_range=tile_range,
     )
-    return Captured(dump, {**frame.passes("opaque"), **appender.clock.passes}, len(bands), appender.repeated)
+    return Captured(dump, {**frame.passes("opaque", "range"), **appender.clock.passes}, len(bands), appender.repeated)
 
 
 @dataclass(frozen=True, slots=True)

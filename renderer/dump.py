@@ -11,6 +11,7 @@ import zarr
 from numpy.typing import NDArray
 from zarr.codecs import BloscCodec
 
+from renderer.tile_range import tile_grid, tile_ranges
 from schemas.fragments import FragmentDump
 from schemas.problem import ExitCode, Problem
 
@@ -19,8 +20,8 @@ _CHUNK = 1 << 20
 
 GROUP = "fragments.zarr"
 """Folder of the group."""
-ARRAYS = ("rgba", "depth", "background", "facing")
-"""Arrays of the group beside the counts: two with an element for each fragment, two with one for each pixel."""
+ARRAYS = ("rgba", "depth", "background", "facing", "tile_range")
+"""Arrays of the group beside the counts: two of them by fragment, two by pixel, one by tile."""
 
 
 def write_dump(folder: Path, dump: FragmentDump, about: Mapping[str, Any] | None = None) -> None:
@@ -34,8 +35,9 @@ def write_dump(folder: Path, dump: FragmentDump, about: Mapping[str, Any] | None
     group = zarr.open_group(folder / GROUP, mode="w")
     group.attrs.update({**(about or {}), "width": dump.width, "height": dump.height})
     _write(group, "counts", dump.counts.astype(np.uint32))
-    for name in ARRAYS:
+    for name in ARRAYS[:-1]:
         _write(group, name, getattr(dump, name))
+    _write(group, ARRAYS[-1], tile_ranges(dump))
 
 
 def read_dump(folder: Path) -> FragmentDump:
@@ -51,7 +53,9 @@ def read_dump(folder: Path) -> FragmentDump:
     except DAMAGE as reason:
         raise damaged(folder) from reason
     dump = FragmentDump(width, height, offsets, *arrays)
-    if len(offsets) - 1 != dump.pixels or not len(dump.rgba) == dump.total == offsets[-1]:
+    columns, rows = tile_grid(width, height)
+    fits = len(arrays[-1]) == columns * rows and len(offsets) - 1 == dump.pixels
+    if not fits or not len(dump.rgba) == dump.total == offsets[-1]:
         raise damaged(folder)
     return dump
 

@@ -10,7 +10,9 @@ import zarr
 from zarr.abc.store import Store
 
 from renderer.dump import ARRAYS, DAMAGE, GROUP, damaged, size_of
+from renderer.tile_range import tile_grid
 from schemas.fragments import FragmentDump
+from schemas.tail import RANGE_TILE
 
 
 class DumpReader:
@@ -41,7 +43,8 @@ class DumpReader:
         self._before = np.concatenate([[0], np.cumsum(totals, dtype=np.int64)])
         lengths = [array.shape[0] for array in (self._counts, *self._arrays)]
         pixels, total = self.width * self.height, int(self._before[-1])
-        if lengths != [pixels, total, total, pixels, pixels]:
+        columns, rows = tile_grid(self.width, self.height)
+        if lengths != [pixels, total, total, pixels, pixels, columns * rows]:
             raise damaged(source)
 
     @property
@@ -62,7 +65,9 @@ class DumpReader:
         counts = self._part(number * self._chunk)
         first = int(self._before[number]) + int(np.sum(counts[:place], dtype=np.int64))
         end = first + int(counts[place])
-        parts = (slice(first, end), slice(first, end), slice(p, p + 1), slice(p, p + 1))
+        y, x = divmod(p, self.width)
+        tile = y // RANGE_TILE * tile_grid(self.width, self.height)[0] + x // RANGE_TILE
+        parts = (*[slice(first, end)] * 2, *[slice(p, p + 1)] * 2, slice(tile, tile + 1))
         rgba, *others = (np.asarray(array[part]) for array, part in zip(self._arrays, parts, strict=True))
         # zarr reads zeros where a chunk is missing; no fragment is stored with alpha 0.
         if not rgba[:, 3].all():

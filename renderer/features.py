@@ -1,14 +1,13 @@
 """Order-independent per-pixel features: the raw sums of one additive pass, and what a predictor reads.
 
-`gather` makes the sums from a fragment dump; the GL passes that fill the same texels per pixel are its twin.
-`derive` turns sums into features. `FEATURES_GLSL` is the one source of the GLSL form of every feature:
-`features_glsl` writes `shaders/common/features.glsl` (all of them) and the part of a bundle's `predict.glsl`
-(those that its model reads).
+`gather` makes the sums from a fragment dump; the GL passes that fill the same texels per pixel are its twin. `FORMULAS`
+is the one source of every feature's formula: the shading languages' forms and `derive` are generated from it, and
+`services.stress.twins` has them once more, by hand and in float64.
 
-Colours are the stored gamma-2 values / 255, alphas the stored values / 255, `x` is the relative depth
-`(z - z_min) / (z_max - z_min)`, 0 where `z_max = z_min`. `front_j` is the share of the optical depth in front of the
-j-th of 16 depth bins, as the binned density tails keep it (`renderer.depth_bins`): with 8 bins only the even ones are
-there, with other tails none is.
+Colours are the stored gamma-2 values / 255, l the optical depth -ln(1-a) of a fragment, y its place from the nearest
+end of its tile's range (0) to the farthest (1) as depth bins see it (`renderer.depth_bins`). `front_b` is the share of
+the optical depth in front of bin b, `mean_b` the mean position in the bin before it, both as the tail keeps them; a
+tail of fewer bins, or without means, leaves the others 0.
 """
 
 from __future__ import annotations
@@ -21,67 +20,82 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.depth_bins import MOST_BINS, OPTICAL, kept_share, units_in_front
+from renderer.depth_bins import OPTICAL, BinForm, bin_form, keep_bins, kept_room, place_of
+from renderer.tile_range import pixel_ranges
 from schemas.fragments import FragmentDump
 from schemas.problem import Problem
+from schemas.tail import LUMA, MOST_BINS, OPTICAL_UNIT, TAILS, TailName
 
-TEXELS: Final = 11
 SUMS: Final[tuple[str, ...]] = (
-    *("n", "sum_a", "sum_a2", "optical_depth"),
-    *("sum_r", "sum_g", "sum_b", "sum_x"),
-    *("sum_a_r", "sum_a_g", "sum_a_b", "sum_x2"),
-    *("sum_r2", "sum_g2", "sum_b2", "z_min"),
-    *("sum_r_x", "sum_g_x", "sum_b_x", "z_max"),
-    *("nearest_r", "nearest_g", "nearest_b", "nearest_a"),
+    *("n", "optical_depth", "z_near", "z_far"),
+    *("sum_l_r", "sum_l_g", "sum_l_b", "sum_l_y_luma"),
+    *("sum_l_r2", "sum_l_g2", "sum_l_b2", "sum_l_y"),
     *("background_r", "background_g", "background_b", "unused"),
-    *(f"front_{j}" for j in range(1, MOST_BINS)),
-    "unused_too",
+    *(f"front_{b}" for b in range(1, MOST_BINS)),
+    "unused_front",
+    *(f"mean_{b}" for b in range(1, MOST_BINS)),
+    "unused_mean",
 )
-"""Columns of the raw sums: RGBA32F texels, in this order. Depths in metres."""
+"""Columns of the raw sums: RGBA32F texels, in this order. Depths in metres: the ends of the tile's range."""
+
+TEXELS: Final = len(SUMS) // 4
+COLOUR_SUMS: Final = SUMS[4:12]
+"""What `gather/bins.frag` sums beside the bins."""
 
 _FRONT: Final = SUMS.index("front_1")
-BINNED: Final = _FRONT // 4
-"""The first texel that the depth bins fill."""
+_MEAN: Final = SUMS.index("mean_1")
 
 
-def _channels(name: str, expression: str) -> dict[str, str]:
-    """Three entries `name_r`, `name_g`, `name_b` of an expression in which `$` stands for the component."""
-    return {f"{name}_{c}": expression.replace("$", c) for c in "rgb"}
+def _channels(name: str, formula: str) -> dict[str, str]:
+    """Three entries `name_r`, `name_g`, `name_b` of a formula in which `$` stands for the component."""
+    return {f"{name}_{c}": formula.replace("$", c) for c in "rgb"}
+
+
+FORMULAS: Final[dict[str, str]] = {
+    "log_n": "log2(n)",
+    "optical_depth": "log(1.0 + optical_depth)",
+    **_channels("rgb_mean", "sum_l_$ * inv_d"),
+    **_channels("rgb_std", "sqrt(max(0.001, sum_l_$2 * inv_d - (sum_l_$ * inv_d) * (sum_l_$ * inv_d)))"),
+    **_channels("background", "background_$"),
+    "depth_mean": "sum_l_y * inv_d",
+    "luma_depth_cov": (
+        "sum_l_y_luma * inv_d - (sum_l_y * inv_d)"
+        f" * ({LUMA[0]} * sum_l_r + {LUMA[1]} * sum_l_g + {LUMA[2]} * sum_l_b) * inv_d"
+    ),
+    "depth_extent": "log(1e-4 + (z_far - z_near) / max(1e-30, z_far))",
+    **{f"front_{b}": f"front_{b}" for b in range(1, MOST_BINS)},
+    **{f"mean_{b}": f"mean_{b}" for b in range(1, MOST_BINS)},
+}
+"""Feature name -> formula of the sums and of `inv_d = 1 / optical_depth`, for n > 0."""
+
+FEATURES: Final[tuple[str, ...]] = tuple(FORMULAS)
+"""Columns of the derived features, in this order. A bundle's manifest lists those its model reads."""
+
+_NAME: Final = re.compile(r"[a-z]\w*(?!\w*\()")
+
+
+def _component(name: str) -> str:
+    """A sum as a shader has it; other names as they are."""
+    if name not in SUMS:
+        return name
+    texel, component = divmod(SUMS.index(name), 4)
+    return f"s[{texel}].{'xyzw'[component]}"
 
 
 FEATURES_GLSL: Final[dict[str, str]] = {
-    "log_n": "log2(s[0].x)",
-    "optical_depth": "log(1.0 + s[0].w)",
-    "alpha_mean": "s[0].y * inv_n",
-    "alpha_std": "sqrt(max(0.0, s[0].z * inv_n - (s[0].y * inv_n) * (s[0].y * inv_n)))",
-    "alpha_nearest": "s[5].a",
-    **_channels("rgb_mean", "s[1].$ * inv_n"),
-    **_channels("rgb_alpha", "s[2].$ / s[0].y"),
-    **_channels("rgb_nearest", "s[5].$"),
-    **_channels("background", "s[6].$"),
-    **_channels("rgb_std", "sqrt(max(0.0, s[3].$ * inv_n - (s[1].$ * inv_n) * (s[1].$ * inv_n)))"),
-    **_channels("rgb_depth_cov", "s[4].$ * inv_n - (s[1].$ * inv_n) * (s[1].w * inv_n)"),
-    "depth_mean": "s[1].w * inv_n",
-    "depth_std": "sqrt(max(0.0, s[2].w * inv_n - (s[1].w * inv_n) * (s[1].w * inv_n)))",
-    "depth_extent": "log(1e-4 + (s[4].w - s[3].w) / s[4].w)",
-    **{f"front_{j + 1}": f"s[{7 + j // 4}].{'xyzw'[j % 4]}" for j in range(MOST_BINS - 1)},
+    feature: _NAME.sub(lambda match: _component(match[0]), formula) for feature, formula in FORMULAS.items()
 }
-"""Feature name -> GLSL expression of the sums `vec4 s[11]` and `float inv_n = 1 / n`, for n > 0."""
-
-FEATURES: Final[tuple[str, ...]] = tuple(FEATURES_GLSL)
-"""Columns of the derived features, in this order. A bundle's manifest lists those its model reads."""
+"""Feature name -> expression of the sums `vec4 s[TEXELS]` and `inv_d`, in every shading language."""
 
 
-def texels_of(names: Sequence[str], binned: bool = False) -> frozenset[int]:
-    """The texels of `SUMS` that features read and a gather pass has to leave for them.
+def sums_read(names: Sequence[str]) -> frozenset[str]:
+    """The members of `SUMS` that some features read."""
+    return frozenset(found for name in names for found in _NAME.findall(FORMULAS[name]) if found in SUMS)
 
-    Args:
-        names: Members of `FEATURES`.
-        binned: Whether the tail's depth bins are gathered, which know the optical depth as well.
-    """
-    read = {(int(texel), c) for name in names for texel, c in re.findall(r"s\[(\d+)\]\.(\w)", FEATURES_GLSL[name])}
-    elsewhere = {(0, "x"), (3, "w"), (4, "w")} | ({(0, "w")} if binned else set())  # the count pass has n and depths
-    return frozenset(texel for texel, _ in read - elsewhere if texel < BINNED)
+
+def reads_colours(names: Sequence[str]) -> bool:
+    """Whether some features read sums that have to be gathered beside the bins."""
+    return not sums_read(names).isdisjoint(COLOUR_SUMS)
 
 
 def features_glsl(names: Sequence[str] = FEATURES) -> str:
@@ -105,7 +119,7 @@ def features_glsl(names: Sequence[str] = FEATURES) -> str:
             "    if (s[0].x < 0.5) {",
             "        for (int i = 0; i < DIAPHANE_FEATURES; ++i) x[i] = 0.0;",
             "    } else {",
-            "        float inv_n = 1.0 / s[0].x;",
+            "        float inv_d = 1.0 / s[0].y;",
             *lines,
             "    }",
             "}",
@@ -114,15 +128,15 @@ def features_glsl(names: Sequence[str] = FEATURES) -> str:
     )
 
 
-def gather(dump: FragmentDump, bins: int = 0) -> NDArray[np.float32]:
+def gather(dump: FragmentDump, tail: TailName) -> NDArray[np.float32]:
     """Raw sums of every pixel.
 
     Args:
         dump: Fragments of a view, front to back in each pixel.
-        bins: Depth bins of the tail (`schemas.tail.DENSITY_BINS`); 0: it has none.
+        tail: A tail with bins.
 
     Returns:
-        float32 [P, 44], columns `SUMS`; accumulated in float64. Rows of pixels without fragments are zero.
+        float32 [P, 4 TEXELS], columns `SUMS`; accumulated in float64. Rows of pixels without fragments are zero.
 
     Raises:
         Problem: A depth is not finite.
@@ -133,9 +147,11 @@ def gather(dump: FragmentDump, bins: int = 0) -> NDArray[np.float32]:
             "Look for NaN or infinite points in the scene, and render the view again.",
         )
     sums = np.zeros((dump.pixels, len(SUMS)), dtype=np.float32)
-    _gather(dump.offsets, dump.rgba, dump.depth, dump.background, sums)
-    if bins:
-        _gather_bins(dump.offsets, dump.rgba, dump.depth, bins, sums)
+    ranges = pixel_ranges(dump)
+    _gather(
+        *(*bin_form(TAILS[tail]), dump.offsets, dump.rgba, dump.depth, dump.background),
+        *(ranges.nearest, ranges.extent, sums),
+    )
     return sums
 
 
@@ -143,101 +159,63 @@ def derive(sums: NDArray[np.float32]) -> NDArray[np.float32]:
     """Features from raw sums, in float32 arithmetic as in a shader.
 
     Args:
-        sums: float32 [P, 44], columns `SUMS`.
+        sums: float32 [P, 4 TEXELS], columns `SUMS`.
 
     Returns:
-        float32 [P, 41], columns `FEATURES`; zero where n = 0.
+        float32 [P, F], columns `FEATURES`; zero where n = 0.
     """
     features = np.zeros((len(sums), len(FEATURES)), dtype=np.float32)
-    _derive(np.ascontiguousarray(sums, dtype=np.float32), features)
+    occupied = sums[:, 0] >= np.float32(0.5)
+    known: dict[str, object] = {name: sums[occupied, i] for i, name in enumerate(SUMS)}
+    known |= {"inv_d": np.float32(1.0) / sums[occupied, 1], "max": np.maximum}
+    known |= {"sqrt": np.sqrt, "log": np.log, "log2": np.log2}
+    for column, formula in enumerate(_COMPILED):
+        features[occupied, column] = eval(formula, {"__builtins__": {}}, known)
     return features
+
+
+_COMPILED: Final = [compile(formula, feature, "eval") for feature, formula in FORMULAS.items()]
 
 
 @numba.njit(parallel=True, cache=True)
 def _gather(
+    bins: int,
+    share_levels: int,
+    mean_levels: int,
     offsets: NDArray[np.int64],
     rgba: NDArray[np.uint8],
     depth: NDArray[np.float32],
     background: NDArray[np.uint8],
+    nearest: NDArray[np.float32],
+    extent: NDArray[np.float32],
     sums: NDArray[np.float32],
 ) -> None:
     for p in numba.prange(len(offsets) - 1):
         first, last = offsets[p], offsets[p + 1]
         if first == last:
             continue
-        z_min = np.float64(depth[first])
-        z_max = np.float64(depth[last - 1])
-        scale = 1.0 / (z_max - z_min) if z_max > z_min else 0.0
-        acc = np.zeros(19)
+        kept, form = kept_room(), BinForm(bins, share_levels, mean_levels)
+        units = keep_bins(form, depth[first:last], rgba[first:last], nearest[p], extent[p], kept)
+        acc = np.zeros(8)
         for i in range(first, last):
-            a = rgba[i, 3] / 255.0
-            x = (np.float64(depth[i]) - z_min) * scale
-            acc[1] += a
-            acc[2] += a * a
-            acc[3] += OPTICAL[rgba[i, 3]]
-            acc[7] += x
-            acc[11] += x * x
+            light = OPTICAL[rgba[i, 3]]
+            y = place_of(depth[i], nearest[p], extent[p], bins) / np.float32(bins)
+            luma = 0.0
             for c in range(3):
                 value = rgba[i, c] / 255.0
-                acc[4 + c] += value
-                acc[8 + c] += a * value
-                acc[12 + c] += value * value
-                acc[16 + c] += value * x
-        acc[0] = last - first
-        acc[15] = z_min
-        for j in range(19):
-            sums[p, j] = acc[j]
-        sums[p, 19] = z_max
-        for c in range(4):
-            sums[p, 20 + c] = rgba[first, c] / 255.0
+                acc[c] += light * value
+                acc[4 + c] += light * value * value
+                luma += LUMA[c] * value
+            acc[3] += light * y * luma
+            acc[7] += light * y
+        row = sums[p]
+        row[0], row[1] = last - first, units / OPTICAL_UNIT
+        row[2], row[3] = nearest[p], nearest[p] + extent[p]
+        for j in range(8):
+            row[4 + j] = acc[j]
         for c in range(3):
-            sums[p, 24 + c] = background[p, c] / 255.0
-
-
-@numba.njit(parallel=True, cache=True)
-def _gather_bins(
-    offsets: NDArray[np.int64],
-    rgba: NDArray[np.uint8],
-    depth: NDArray[np.float32],
-    bins: int,
-    sums: NDArray[np.float32],
-) -> None:
-    every = MOST_BINS // bins
-    for p in numba.prange(len(offsets) - 1):
-        first, last = offsets[p], offsets[p + 1]
-        if first == last:
-            continue
-        front = np.empty(bins + 1)
-        units_in_front(depth[first:last], rgba[first:last], front)
+            row[12 + c] = background[p, c] / 255.0
         for b in range(1, bins):
-            sums[p, _FRONT - 1 + every * b] = kept_share(front[b], front[bins])
-
-
-@numba.njit(parallel=True, cache=True)
-def _derive(sums: NDArray[np.float32], out: NDArray[np.float32]) -> None:
-    one, zero = np.float32(1.0), np.float32(0.0)
-    for p in numba.prange(len(sums)):
-        s, x = sums[p], out[p]
-        if s[0] < np.float32(0.5):
-            continue
-        inv_n = one / s[0]
-        x[0] = np.log2(s[0])
-        x[1] = np.log(one + s[3])
-        mean_a = s[1] * inv_n
-        mean_x = s[7] * inv_n
-        x[2] = mean_a
-        x[3] = np.sqrt(max(zero, s[2] * inv_n - mean_a * mean_a))
-        x[4] = s[23]
-        for c in range(3):
-            mean = s[4 + c] * inv_n
-            x[5 + c] = mean
-            x[8 + c] = s[8 + c] / s[1]
-            x[11 + c] = s[20 + c]
-            x[14 + c] = s[24 + c]
-            x[17 + c] = np.sqrt(max(zero, s[12 + c] * inv_n - mean * mean))
-            x[20 + c] = s[16 + c] * inv_n - mean * mean_x
-        x[23] = mean_x
-        x[24] = np.sqrt(max(zero, s[11] * inv_n - mean_x * mean_x))
-        x[25] = np.log(np.float32(1e-4) + (s[19] - s[15]) / s[19])
-        for j in range(MOST_BINS - 1):
-            x[26 + j] = s[_FRONT + j]
+            row[_FRONT - 1 + b] = kept.front[b]
+            if mean_levels:
+                row[_MEAN - 1 + b] = kept.mean[b - 1]

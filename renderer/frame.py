@@ -1,4 +1,4 @@
-"""One view of a scene on the GPU, and the passes that every technique shares: opaque, count, gather."""
+"""One view of a scene on the GPU, and the passes that techniques share: opaque, count, range, and additive ones."""
 
 from __future__ import annotations
 
@@ -6,88 +6,27 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Literal
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
 from renderer import timing
-from renderer.gpu_scene import OPAQUE, TRANSPARENT, GpuScene, run_for, set_uniforms
+from renderer.bin_pass import Binned, gather_bins
+from renderer.gpu_scene import OPAQUE, TRANSPARENT, GpuScene, set_uniforms
 from renderer.programs import Defines
+from renderer.tile_range import STEPS, tile_grid
+from renderer.tiles import Tiles, tiles_of
 from schemas.colour import encode_gamma2
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
-from schemas.tail import BIN_LIMIT, OPTICAL_UNIT, PLAIN_SHARE, ROOT_SHARE, SHARE_LEVELS
+from schemas.tail import RANGE_TILE, TailName
 from schemas.view import View
 
 RGB = tuple[float, float, float]
 
-Gather = Literal["gather-tail", "gather-nearest", "gather"]
-"""What a gather pass leaves: the tail's sums; also the nearest fragment; what a predictor reads. Names of passes."""
-
-NEAREST = 5
-"""The texel of `renderer.features.SUMS` that is the nearest fragment; those before it are sums by blending."""
-BIN_DEFINES: Defines = {
-    **{"ROOT_SHARE": ROOT_SHARE, "PLAIN_SHARE": PLAIN_SHARE, "SHARE_LEVELS": SHARE_LEVELS},
-    **{"OPTICAL_UNIT": OPTICAL_UNIT, "BIN_LIMIT": BIN_LIMIT},
-}
-"""What `shaders/common/depth_bins.glsl` and its users need beside BINS."""
-ALL_TEXELS = frozenset(range(NEAREST + 1))
-_TEXELS: dict[Gather, frozenset[int]] = {
-    "gather-tail": frozenset({0}),
-    "gather-nearest": frozenset({0, NEAREST}),
-    "gather": ALL_TEXELS,
-}
-
 # Shader storage bindings that several passes share.
-COUNT, Z_MIN, Z_MAX, NEAREST_COLOUR, NEAREST_FACING = range(5)
-
-
-@dataclass(slots=True)
-class Gathered:
-    """Order-independent sums of a frame, on the GPU.
-
-    Attributes:
-        name: Of the pass.
-        sums: RGBA32F textures, with bins RGBA16F, five: `gather/gather.frag` says what each holds. Where one was not
-            asked for, another stands in its place.
-        nearest_colour: uint32 [P], packed colour of the nearest fragment, all ones where none; None if not gathered.
-        nearest_facing: uint32 [P], its |n . e| * 255; None if not gathered.
-        bins: Depth bins of `front`; 0: none.
-        front: uint32 [P, 1 + bins / 8], the optical depth and its shares in front of the bins, as
-            `shaders/common/depth_bins.glsl` says; None without bins.
-    """
-
-    name: Gather
-    sums: list[moderngl.Texture]
-    nearest_colour: moderngl.Buffer | None = None
-    nearest_facing: moderngl.Buffer | None = None
-    bins: int = 0
-    front: moderngl.Buffer | None = None
-
-    @property
-    def pixel_bytes(self) -> int:
-        """Bytes a pixel of all this."""
-        sums = sum({texture.glo: _SUM_BYTES.get(texture.dtype, 0) for texture in self.sums}.values())
-        nearest = sum(4 for buffer in (self.nearest_colour, self.nearest_facing) if buffer is not None)
-        return sums + nearest + front_bytes(self.bins)
-
-    @property
-    def pass_bytes(self) -> int:
-        """Bytes a pixel while it is gathered.
-
-        Bins are gathered first, two bytes each and D with four; when all else is, they are packed.
-        """
-        return max(self.pixel_bytes, front_bytes(self.bins) + 2 * self.bins + 4 if self.bins else 0)
-
-
-_SUM_BYTES = {"f4": 16, "f2": 8}
-
-
-def front_bytes(bins: int) -> int:
-    """Bytes a pixel of packed depth bins."""
-    return 4 + bins // 2 if bins else 0
+COUNT, Z_MIN, Z_MAX, NEAREST_FACING = range(4)
 
 
 @dataclass(slots=True)
@@ -122,6 +61,7 @@ class Frame:
 
     Attributes:
         culled_triangles: Triangles outside the frustum, which no pass draws.
+        tiles: By their fullest pixel, once `depth_range` has counted; None before.
     """
 
     def __init__(self, gpu: GpuScene, view: View, width: int, height: int, clear: RGB = (1.0, 1.0, 1.0)) -> None:
@@ -139,11 +79,13 @@ class Frame:
         self.background = self.ctx.texture((width, height), 4)
         self.background.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self.depth = self.ctx.depth_renderbuffer((width, height))
+        self.tiles: Tiles | None = None
         self._counts: moderngl.Buffer | None = None
         self._range: tuple[moderngl.Buffer, moderngl.Buffer] | None = None
-        self._gathered: dict[tuple[Gather, frozenset[int], int], Gathered] = {}
+        self._tile_range: moderngl.Buffer | None = None
+        self._binned: dict[tuple[TailName, bool, bool], Binned] = {}
+        self._density: moderngl.Texture | None = None
         self._count_array: NDArray[np.uint32] | None = None
-        self._spare: list[moderngl.Texture] = []
         with self.clock.measure("opaque"):
             self._draw_opaque(clear)
 
@@ -218,14 +160,11 @@ class Frame:
 
     def float_targets(self, *components: int) -> list[moderngl.Texture]:
         """Float32 textures of the frame's size, zero, one for each number of components."""
-        return self._zeroed(
-            [
-                self._spare.pop()
-                if count == 4 and self._spare
-                else self.ctx.texture((self.width, self.height), count, dtype="f4")
-                for count in components
-            ]
-        )
+        return self._zeroed([self.ctx.texture((self.width, self.height), count, dtype="f4") for count in components])
+
+    def targets(self, count: int, dtype: str) -> list[moderngl.Texture]:
+        """Textures of the frame's size with four components, zero."""
+        return self._zeroed([self.ctx.texture((self.width, self.height), 4, dtype=dtype) for _ in range(count)])
 
     def _zeroed(self, made: list[moderngl.Texture]) -> list[moderngl.Texture]:
         """The same textures, of the frame's size, as targets."""
@@ -285,96 +224,81 @@ class Frame:
                     buffer.bind_to_storage_buffer(binding)
                 self.draw_transparent("count/count.frag", self.target([]), {"RANGE": 1})
                 self.ctx.memory_barrier()
+                self.tiles = tiles_of(self.ctx, self.gpu.programs, self._counts, self.width, self.height)
         return self._counts, *self._range
 
-    def gather(self, what: Gather, texels: frozenset[int] | None = None, bins: int = 0) -> Gathered:
-        """The order-independent sums of every pixel, by one additive pass.
+    def tile_range(self) -> moderngl.Buffer:
+        """Between which depths each tile's depth bins lie: uint32 [T, 2], float bits (`renderer.tile_range`)."""
+        if self._tile_range is None:
+            with self.clock.measure("range"):
+                self._tile_range = self._estimated_range()
+        return self._tile_range
 
-        Args:
-            what: Which pass.
-            texels: Of a `gather`: which texels of `renderer.features.SUMS` are read; None: all. The first is always
-                there without bins.
-            bins: Depth bins that a tail needs (`schemas.tail.DENSITY_BINS`). With them the first texel is there only
-                if it is asked for: the count pass has n, and the bins have the optical depth.
-        """
-        wanted = _TEXELS[what] if texels is None else texels & _TEXELS[what]
-        if not bins:
-            wanted |= {0}
-        elif texels is None and what != "gather":
-            wanted -= {0}
-        if (what, wanted, bins) not in self._gathered:
-            _, z_min, z_max = self.depth_range()
-            self.clock.passes.pop(what, None)
-            with self.clock.measure(what):
-                self._gathered[what, wanted, bins] = self._gather(what, wanted, bins, z_min, z_max)
-        return self._gathered[what, wanted, bins]
-
-    def retire(self, gathered: Gathered) -> Gathered:
-        """Give back what only a predictor reads of a gather pass: two of its textures become the next targets.
-
-        Returns:
-            What a tail reads: the packed bins, or the first texture. The pass runs again if somebody asks for all of
-            it again.
-        """
-        self._gathered = {key: kept for key, kept in self._gathered.items() if kept is not gathered}
-        first = gathered.sums[0] if gathered.front is None else self.background
-        others = {t.glo: t for t in gathered.sums if t.glo != first.glo and t.dtype == "f4"}
-        self._spare = [*self._spare, *others.values()][:2]
-        return Gathered(gathered.name, [first] * len(gathered.sums), bins=gathered.bins, front=gathered.front)
-
-    def _gather(
-        self, what: Gather, texels: frozenset[int], bins: int, z_min: moderngl.Buffer, z_max: moderngl.Buffer
-    ) -> Gathered:
-        gathered = Gathered(what, [], bins=bins)
-        z_min.bind_to_storage_buffer(Z_MIN)
-        z_max.bind_to_storage_buffer(Z_MAX)
-        blended = sorted(texels - {NEAREST})
-        nearest: Defines = {"NEAREST": 2 if what == "gather-nearest" else int(NEAREST in texels)}
-        if bins:
-            # Before all else, which need not be there yet: together they would be the peak of the frame.
-            gathered.front = self._gather_bins(bins)
-        # With bins no tail reads these sums, only a network, and half floats serve it as well (PREDICTORS.md).
-        targets = self._zero_targets(len(blended), "f2") if bins else self.float_targets(*[4] * len(blended))
-        if texels:
-            if NEAREST in texels:
-                gathered.nearest_colour = self.buffer(self.pixels, 0xFFFFFFFF)
-                gathered.nearest_colour.bind_to_storage_buffer(NEAREST_COLOUR)
-            if what == "gather-nearest":
-                gathered.nearest_facing = self.buffer(self.pixels, 0)
-                gathered.nearest_facing.bind_to_storage_buffer(NEAREST_FACING)
-            places: Defines = {f"SUMS{texel}": place for place, texel in enumerate(blended)}
-            self.draw_transparent("gather/gather.frag", self.target(targets), {**places, **nearest, "BINS": 0})
-        made = dict(zip(blended, targets, strict=True))
-        # Where nothing is blended, a shader gets a texture that it does not read.
-        first = next(iter(made.values()), self.background)
-        gathered.sums = [made.get(texel, first) for texel in range(NEAREST)]
+    def _estimated_range(self) -> moderngl.Buffer:
+        columns, rows = tile_grid(self.width, self.height)
+        tiles = columns * rows
+        found, ranges = self.ctx.buffer(np.tile(np.array([2**32 - 1, 0], np.uint32), tiles)), self.buffer(2 * tiles, 0)
+        found.bind_to_storage_buffer(0)
+        # Whole tiles: the picture's last ones may reach beyond it.
+        target = self.ctx.framebuffer([self.ctx.texture((columns * STEPS, rows * STEPS), 1, dtype="f1")])
+        target.color_mask = (False,) * 4
+        target.use()
+        self.ctx.enable_only(moderngl.NOTHING)
+        scale = self.width / (columns * RANGE_TILE), self.height / (rows * RANGE_TILE)
+        uniforms = {**self.uniforms, "projection": _widened(self.uniforms["projection"], scale), "width": columns}
+        self.gpu.draw("range/range.frag", TRANSPARENT, uniforms, {"STEPS": STEPS}, visible=self._visible)
         self.ctx.memory_barrier()
-        self.target([]).use()  # a context keeps alive what is bound: the targets, long after the last use of them
-        return gathered
-
-    def _gather_bins(self, bins: int) -> moderngl.Buffer:
-        """Depth bins by blending, packed; their targets are gone when this returns."""
-        targets = self._bin_targets(bins)
-        defines: Defines = {"NEAREST": 0, "BINS": bins, **BIN_DEFINES}
-        self.draw_transparent("gather/gather.frag", self.target(targets), defines)
+        program = self.gpu.programs.compute("range/fill.comp")
+        found.bind_to_storage_buffer(0)
+        ranges.bind_to_storage_buffer(1)
+        set_uniforms(program, {"columns": columns, "rows": rows})
+        program.run(1)
+        self.ctx.memory_barrier()
         self.target([]).use()
-        return self._pack(bins, targets)
+        return ranges
 
-    def _zero_targets(self, count: int, dtype: str) -> list[moderngl.Texture]:
-        """Textures of four components, zero."""
-        return self._zeroed([self.ctx.texture((self.width, self.height), 4, dtype=dtype) for _ in range(count)])
+    def gather_bins(self, tail: TailName, *, colours: bool = False, counts: bool = False) -> Binned:
+        """The depth bins of a tail, by one additive pass; arguments as `renderer.bin_pass.gather_bins` has them."""
+        key = (tail, colours, counts)
+        if key not in self._binned:
+            self.tile_range()
+            self.clock.passes.pop("bins", None)
+            with self.clock.measure("bins"):
+                self._binned[key] = gather_bins(self, tail, colours=colours, counts=counts)
+        return self._binned[key]
 
-    def _bin_targets(self, bins: int) -> list[moderngl.Texture]:
-        """The optical depth, float32, and the depth bins, 16 bits each that blending adds and clamps exactly; zero."""
-        return [*self.float_targets(1), *self._zero_targets(bins // 4, "nu2")]
+    def forget_bins(self, binned: Binned) -> None:
+        """Let go of what a technique is going to change or to give back; the pass runs again for the next one."""
+        self._binned = {key: kept for key, kept in self._binned.items() if kept is not binned}
 
-    def _pack(self, bins: int, binned: list[moderngl.Texture]) -> moderngl.Buffer:
-        """The gathered depth bins as words."""
-        packed = self.buffer(self.pixels * front_bytes(bins) // 4, 0)
-        program = self.gpu.programs.compute("gather/pack.comp", {"BINS": bins, **BIN_DEFINES})
-        packed.bind_to_storage_buffer(0)
-        for unit, texture in enumerate(binned):
-            texture.use(unit)
-        set_uniforms(program, {"width": self.width, "pixels": self.pixels})
-        run_for(program, self.pixels)
-        return packed
+    def gather_density(self) -> moderngl.Texture:
+        """RGBA32F, what the `density` tail reads of every pixel: n, sum a, sum a^2, sum -ln(1-a)."""
+        if self._density is None:
+            with self.clock.measure("gather"):
+                (self._density,) = self.float_targets(4)
+                self.draw_transparent("gather/density.frag", self.target([self._density]))
+        return self._density
+
+    def gather_facing(self) -> moderngl.Buffer:
+        """uint32 [P], |n . e| * 255 of the nearest fragment of every pixel, of all of equal depth the greatest."""
+        _, z_min, _ = self.depth_range()
+        with self.clock.measure("facing"):
+            facing = self.buffer(self.pixels, 0)
+            z_min.bind_to_storage_buffer(Z_MIN)
+            facing.bind_to_storage_buffer(NEAREST_FACING)
+            self.draw_transparent("gather/facing.frag", self.target([]))
+            self.ctx.memory_barrier()
+        return facing
+
+
+def _widened(projection: object, scale: tuple[float, float]) -> tuple[float, ...]:
+    """A projection, as uniform, to a target that reaches beyond the picture at its right and lower edge.
+
+    Args:
+        projection: Column by column.
+        scale: Width and height of the picture as shares of the target's.
+    """
+    matrix = np.array(projection, dtype=np.float64).reshape(4, 4).T
+    for axis in range(2):
+        matrix[axis] = scale[axis] * matrix[axis] + (scale[axis] - 1.0) * matrix[3]
+    return tuple(matrix.T.ravel().tolist())

@@ -84,7 +84,10 @@ class BenchCell(CellKey):
         pool_bytes: Size of the fragment pool.
         pixel_bytes: All other buffers beside it, bytes a pixel.
         early_bytes: Most before there is a pool, bytes a pixel.
-        total_bytes: The peak of the frame: pool and what lives beside it, or what was there before.
+        total_bytes: The peak of the frame: pool and what lives beside it, or what was there before;
+            of multilayer and adaptive their nodes, which the pool emulates.
+        fits: Whether the pool is no larger than one storage buffer (`schemas.limits.LIMITS.buffer_bytes`). A larger one
+            is rendered in bands of rows, or not at all (`problem`); the bytes are what the whole frame needs.
         score: (mse + LOSSLESS) / (mse of the oracle + LOSSLESS).
         score_display: The same of `mse_display`.
         over_optimum: As `score`, with the certified optimum of the cell's own tail instead of the oracle.
@@ -115,6 +118,7 @@ class BenchCell(CellKey):
     pixel_bytes: int | None = Field(default=None, ge=0)
     early_bytes: int = Field(default=0, ge=0)
     total_bytes: int | None = Field(default=None, ge=0)
+    fits: bool = True
     score: float | None = Field(default=None, gt=0.0)
     score_display: float | None = Field(default=None, gt=0.0)
     over_optimum: float | None = Field(default=None, gt=0.0)

@@ -1,7 +1,7 @@
 """The manifest of a bundle: what its predictor reads, which tail it was trained for, and what was proven of it.
 
 A bundle is a folder with `manifest.json` and the files that it lists by hash. The predictor gives `a` and `b` per
-pixel; the renderer keeps `k = clamp(floor(1.5 + (a - log lambda) / b), k_min, n)` fragments (METHOD.md section 4).
+pixel; the renderer keeps `k = clamp(floor(1.5 + (a - log lambda) / b), 0, n)` fragments (METHOD.md section 4).
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ import hashlib
 import math
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Final, Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError, field_validator, model_validator
 
 from schemas.problem import ExitCode, Problem
-from schemas.tail import MetricName, TailName
+from schemas.tail import BINNED_TAILS, MetricName, TailName
 
-FormatName = Literal["diaphane-bundle/1", "diaphane-bundle/2"]
+FormatName = Literal["diaphane-bundle/2"]
 FORMAT: Final = "diaphane-bundle/2"
 MANIFEST: Final = "manifest.json"
 WEIGHTS: Final = "weights.safetensors"
@@ -41,9 +41,6 @@ SHADERS: Final = (GLSL, UBO, WGSL, HLSL, GLSL_HALF, UBO_HALF, WGSL_HALF)
 FILES: Final = (WEIGHTS, ONNX, GLSL, UBO, UBO_DATA, WGSL, HLSL, *HALF_FILES)
 """What a bundle holds beside its manifest."""
 
-_FIRST_FILES: Final = (WEIGHTS, ONNX, GLSL)
-"""What one of the format `diaphane-bundle/1` holds."""
-
 GAIN_FLOOR: Final = 0.02
 """`b = softplus(.) + GAIN_FLOOR`: log gain lost per fragment is at least this, so that 1 / b stays finite."""
 
@@ -57,7 +54,7 @@ HEADS: Final[dict[HeadName, tuple[tuple[OutputName, ...], ...]]] = {
     "gain-curve": (("a", "b"), ("a", "b", "g")),
     "importance": (("importance",),),
 }
-"""What a network of each head may answer; the first is meant where a manifest does not say.
+"""What a network of each head may answer.
 
 `a`, `b`: the log gain of core fragment k is `a - b (k - 1)`. `g`: the density tail's constant of the pixel.
 `importance`: DHOIT's share of a pixel, which Eq. 3 turns into k.
@@ -109,12 +106,24 @@ class LayerSpec(BaseModel):
 
 
 class TailSpec(BaseModel):
-    """The tail whose error curves the predictor was trained on; it must be rendered with the same."""
+    """The tail whose error curves the predictor was trained on; it must be rendered with the same.
+
+    Attributes:
+        name: A tail with depth bins: what is predicted is how many of them are the core.
+        g: The density tail's constant.
+    """
 
     model_config = _STRICT
 
     name: TailName
     g: float = Field(ge=0.0)
+
+    @field_validator("name")
+    @classmethod
+    def _has_bins(cls, name: TailName) -> TailName:
+        if name not in BINNED_TAILS:
+            raise ValueError(f"the tail {name} has no depth bins; one of {', '.join(BINNED_TAILS)} has")
+        return name
 
 
 class FileSpec(BaseModel):
@@ -136,7 +145,7 @@ class ParityReport(BaseModel):
         tolerance: What was allowed in float32.
         torch_onnx: torch against onnxruntime.
         torch_glsl: torch against `predict.glsl` run by the driver below.
-        torch_ubo: torch against `predict_ubo.glsl`; None in bundles of the first format.
+        torch_ubo: torch against `predict_ubo.glsl`.
         half_tolerance: What was allowed with weights in float16 and arithmetic in float32.
         half: The files of which that is true, run by the driver below -> difference.
         float16: With hidden layers computed in float16 too, every product and sum rounded. Relative to the scale of the
@@ -152,7 +161,7 @@ class ParityReport(BaseModel):
     tolerance: float = Field(gt=0.0)
     torch_onnx: float = Field(ge=0.0)
     torch_glsl: float = Field(ge=0.0)
-    torch_ubo: float | None = Field(default=None, ge=0.0)
+    torch_ubo: float = Field(ge=0.0)
     half_tolerance: float = Field(default=2e-3, gt=0.0)
     half: dict[str, float] = {}
     float16: float | None = None
@@ -162,7 +171,7 @@ class ParityReport(BaseModel):
     @property
     def worst(self) -> float:
         """The largest difference in float32."""
-        return max(self.torch_onnx, self.torch_glsl, self.torch_ubo or 0.0)
+        return max(self.torch_onnx, self.torch_glsl, self.torch_ubo)
 
     @property
     def half_holds(self) -> bool:
@@ -239,10 +248,9 @@ class Manifest(BaseModel):
         layers: Tensors of `weights.safetensors`.
         tail: Tail of the allocation.
         metric: Where the error was measured.
-        k_min: Fewest core fragments of an occupied pixel where the budget covers that, else 0.
         files: File name -> size and hash.
-        onnx: What `model.onnx` needs; None in the first format.
-        self_test: Rows to check a compiled form with; None in the first format.
+        onnx: What `model.onnx` needs.
+        self_test: Rows to check a compiled form with.
         parity: Agreement of torch, ONNX and GLSL.
         provenance: Where it comes from.
         evaluation: What was measured on held-out scenes.
@@ -259,29 +267,17 @@ class Manifest(BaseModel):
     layers: tuple[LayerSpec, ...]
     tail: TailSpec
     metric: MetricName
-    k_min: int = Field(ge=0, le=1)
     files: dict[str, FileSpec]
-    onnx: OnnxSpec | None = None
-    self_test: SelfTest | None = None
+    onnx: OnnxSpec
+    self_test: SelfTest
     parity: ParityReport
     provenance: Provenance
     evaluation: dict[str, JsonValue]
 
-    @model_validator(mode="before")
-    @classmethod
-    def _usual_outputs(cls, fields: Any) -> Any:
-        if isinstance(fields, dict) and "outputs" not in fields:
-            choices = HEADS.get(fields.get("head", "gain-curve"), ((),))
-            return {**fields, "outputs": choices[0]}
-        return fields
-
     @model_validator(mode="after")
     def _exactly_our_files(self) -> Manifest:
-        allowed = (_FIRST_FILES,) if self.format == "diaphane-bundle/1" else (FILES, FILES[: -len(HALF_FILES)])
-        if set(self.files) not in map(set, allowed):
-            raise ValueError(f"the files must be {', '.join(allowed[0])}")
-        if self.format != "diaphane-bundle/1" and (self.onnx is None or self.self_test is None):
-            raise ValueError("onnx or self_test is missing")
+        if set(self.files) not in (set(FILES), set(FILES) - set(HALF_FILES)):
+            raise ValueError(f"the files must be {', '.join(FILES)}, with or without those in float16")
         return self
 
     @model_validator(mode="after")

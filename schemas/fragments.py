@@ -24,6 +24,9 @@ class FragmentDump:
         depth: float32 [N], view-space distance along the view axis, metres, > 0.
         background: uint8 [P, 3], gamma-2 encoded colour of what lies behind: opaque geometry or the clear colour.
         facing: uint8 [P], |n . e| * 255 of the nearest transparent fragment (VKB's Fresnel factor); 0 where none.
+        tile_range: float32 [T, 2], depths between which the depth bins of each tile's pixels lie, as the renderer found
+            them (`renderer.tile_range`), tiles of `schemas.tail.RANGE_TILE` squared pixels by rows; None: those of the
+            tile's nearest and farthest fragment.
     """
 
     width: int
@@ -33,6 +36,7 @@ class FragmentDump:
     depth: NDArray[np.float32]
     background: NDArray[np.uint8]
     facing: NDArray[np.uint8]
+    tile_range: NDArray[np.float32] | None = None
 
     @property
     def pixels(self) -> int:

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_vali
 from schemas.limits import LIMITS
 from schemas.network import DEFAULT_NETWORK, NetworkSize
 from schemas.pixel_weights import DEFAULT_WEIGHTS, PixelWeights
-from schemas.tail import DEFAULT_TAIL, DENSITY_G, TailName
+from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, DENSITY_G, TailName
 from schemas.view import ListedView
 
 JobKind = Literal["build", "render", "label", "train", "evaluate"]
@@ -129,6 +129,8 @@ class JobSpec(BaseModel):
     def _consistent(self) -> Self:
         if self.kind in ("build", "train") and self.name is None:
             raise ValueError(f"a {self.kind} needs a name")
+        if self.kind in ("build", "train") and self.tail not in BINNED_TAILS:
+            raise ValueError(f"a {self.kind} makes a bundle, whose tail has depth bins: {', '.join(BINNED_TAILS)}")
         if self.kind == "evaluate" and self.model is None:
             raise ValueError("an evaluate needs a model")
         if self.begins_with is not None and self.kind not in ("build", "train"):

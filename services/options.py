@@ -3,6 +3,7 @@
 Rules:
 - every scene exists and is named once; held-out scenes are among the scenes, and at least one is left to train on;
 - budgets are positive multiples of width * height fragments;
+- the tail has depth bins, which a bundle's cores are made of;
 - whatever does not hold is a `Problem` that names the option and says what to change.
 """
 
@@ -21,7 +22,7 @@ from schemas.limits import LIMITS
 from schemas.network import DEFAULT_NETWORK, SIZES, NetworkSize
 from schemas.pixel_weights import DEFAULT_WEIGHTS, PIXEL_WEIGHTS, PixelWeights
 from schemas.problem import ExitCode, Problem
-from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAILS, TailName
+from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, DENSITY_G, TAIL_NAMES, TailName
 from services.registry import check_name
 
 Name = TypeVar("Name", bound=str)
@@ -41,7 +42,7 @@ class BuildOptions:
         views_per_scene: How many views are sampled of a scene without cameras of its own.
         width: Pixels per row.
         height: Rows.
-        tail: How the fragments beyond k are averaged (METHOD.md section 2).
+        tail: How the fragments beyond k are averaged (METHOD.md section 2); one with depth bins.
         g: Steepness of the density tail.
         seed: Seed of everything drawn at random: views, sampled pixels, weights, batches.
         steps: Optimiser steps; None: the trainer's default.
@@ -79,6 +80,7 @@ class BuildOptions:
 
     def __post_init__(self) -> None:
         check_name(self.name)
+        check_bundle_tail(self.tail)
         _check_scenes(self.scenes)
         _check_numbers(self)
         object.__setattr__(self, "budgets", tuple(sorted(set(self.budgets))))
@@ -151,7 +153,20 @@ def check_steepness(g: float | None, *, has_bundle: bool, is_tail_named: bool, o
         )
 
 
-def chosen_tail(tail: TailName | None, g: float | None, trained: TailSpec | None) -> TailSpec:
+@dataclass(frozen=True, slots=True)
+class ChosenTail:
+    """A tail to render with; unlike a bundle's, it may be any.
+
+    Attributes:
+        name: Of the tail.
+        g: The density tail's constant.
+    """
+
+    name: TailName
+    g: float
+
+
+def chosen_tail(tail: TailName | None, g: float | None, trained: TailSpec | None) -> ChosenTail:
     """What is rendered: a tail that is asked for, else the one that a network was trained with, else the usual one.
 
     Args:
@@ -161,7 +176,42 @@ def chosen_tail(tail: TailName | None, g: float | None, trained: TailSpec | None
     """
     name = tail or (DEFAULT_TAIL if trained is None else trained.name)
     usual = trained.g if trained is not None and trained.name == name else DENSITY_G
-    return TailSpec(name=name, g=usual if g is None else g)
+    return ChosenTail(name, usual if g is None else g)
+
+
+def check_bundle_tail(tail: TailName) -> None:
+    """Refuse to make a bundle for a tail that its predictor cannot use.
+
+    Args:
+        tail: Asked for.
+
+    Raises:
+        Problem: It has no depth bins.
+    """
+    if tail not in BINNED_TAILS:
+        raise Problem(
+            f"A bundle cannot be made for the tail {tail}: it has no depth bins, which its cores are made of.",
+            f"Use one of {', '.join(BINNED_TAILS)}: --tail {DEFAULT_TAIL}.",
+        )
+
+
+def check_trained_tail(tail: TailName | None, trained: TailSpec | None) -> None:
+    """Refuse to render a bundle with another tail than its own.
+
+    Args:
+        tail: Asked for; None: not.
+        trained: Tail of the bundle that is rendered; None: none is.
+
+    Raises:
+        Problem: They differ.
+    """
+    if tail is None or trained is None or tail == trained.name:
+        return
+    train = f", or train a bundle with `diaphane build --tail {tail}`" if tail in BINNED_TAILS else ""
+    raise Problem(
+        f"The bundle was trained with the tail {trained.name}, and cannot be rendered with {tail}.",
+        f"Leave out --tail or the techniques that need a bundle{train}.",
+    )
 
 
 def check_bundle(reference: str | None, option: str) -> None:
@@ -212,7 +262,7 @@ def parse_tail(text: str, option: str = "--tail") -> TailName:
     Raises:
         Problem: There is none.
     """
-    return _named(text, TAILS, "There is no tail", f"{option} {DEFAULT_TAIL}")
+    return _named(text, TAIL_NAMES, "There is no tail", f"{option} {DEFAULT_TAIL}")
 
 
 def parse_network(text: str) -> NetworkSize:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import metrics
+from renderer.exact_bytes import exact_bytes, fits
 from renderer.exr import camera_attributes, write_exr
 from renderer.exr_header import Attribute
 from renderer.frame import Frame
@@ -21,11 +22,10 @@ from renderer.scene import NothingToDraw
 from renderer.techniques import TECHNIQUES, Budget, KBufferDeep, Rendered, SBuffer, Technique, technique
 from renderer.techniques.skips import HIDDEN_FRAGMENTS
 from renderer.timecodes import numbered
-from schemas.bundle import TailSpec
 from schemas.colour import display8
 from schemas.problem import ExitCode, Problem
 from services.local_scenes import Chosen, LocalScene, as_usd
-from services.options import check_budget, chosen_tail
+from services.options import ChosenTail, check_budget, check_trained_tail, chosen_tail
 from services.progress import Progress
 from services.render_options import RenderOptions
 from services.stages.pictures import write_png
@@ -57,7 +57,8 @@ class Picture:
         passes: Milliseconds of each pass.
         pool_bytes: Storage that grows with fragments or slots.
         pixel_bytes: All other buffers beside it, bytes a pixel.
-        total_bytes: Peak of the frame.
+        total_bytes: Peak of the frame. Of an exact technique also where there is no picture: what it would need.
+        fits: Whether the pool fits one storage buffer; a larger one is rendered in bands of rows, or not at all.
         skips: What was not needed -> how often.
         mse: Against the exact picture, 8-bit sRGB, values in [0,1]; None if it was not compared.
         psnr: dB; None also for no error.
@@ -84,6 +85,7 @@ class Picture:
     pool_bytes: int | None = None
     pixel_bytes: int | None = None
     total_bytes: int | None = None
+    fits: bool = True
     skips: dict[str, int] | None = None
     mse: float | None = None
     psnr: float | None = None
@@ -113,7 +115,7 @@ class _Job:
     chosen: Chosen
     frame: float | None
     size: tuple[int, int]
-    tail: TailSpec
+    tail: ChosenTail
 
 
 def render(options: RenderOptions, progress: Progress) -> Iterator[Picture]:
@@ -126,6 +128,7 @@ def render(options: RenderOptions, progress: Progress) -> Iterator[Picture]:
         needs = replace(options.needs, bundle=bundle, allocate=optimal)
         techniques = [technique(name, needs) for name in options.techniques]
         trained = next((each.manifest.tail for each in techniques if isinstance(each, KBufferDeep)), None)
+        check_trained_tail(options.tail, trained)
         tail = chosen_tail(options.tail, options.g, trained)
         written: set[Path] = set()
         for file in options.scenes:
@@ -137,7 +140,7 @@ def render(options: RenderOptions, progress: Progress) -> Iterator[Picture]:
 def _scene(
     scene: LocalScene,
     techniques: list[Technique],
-    tail: TailSpec,
+    tail: ChosenTail,
     options: RenderOptions,
     progress: Progress,
     written: set[Path],
@@ -197,7 +200,7 @@ def _picture(job: _Job, each: Technique, path: Path, options: RenderOptions, war
     except Problem as problem:
         if problem.code != ExitCode.LIMIT or len(options.techniques) == 1:
             raise
-        return replace(about, problem=problem.title)
+        return _unrendered(about, job, options, problem)
     found = _measured(about, rendered, frame)
     if options.compare:
         found = _compared(found, rendered, _shoot(job, SBuffer(), budget, job.size, options)[1])
@@ -213,6 +216,24 @@ def _shoot(
     return frame, each.render(frame, budget)
 
 
+def _unrendered(about: Picture, job: _Job, options: RenderOptions, problem: Problem) -> Picture:
+    """Why there is no picture, and the bytes that an exact technique would need for one."""
+    found = replace(about, problem=problem.title)
+    if about.family != "exact":
+        return found
+    n = Frame(job.scene.gpu(), job.chosen.view, *job.size, options.background).count()
+    needed = exact_bytes(about.technique, n)
+    assert needed is not None, "every exact technique says what it needs"
+    return replace(
+        found,
+        fragments=int(n.sum(dtype=np.int64)),
+        pool_bytes=needed.pool,
+        pixel_bytes=needed.pixel,
+        total_bytes=needed.total,
+        fits=fits(needed.pool),
+    )
+
+
 def _measured(about: Picture, rendered: Rendered, frame: Frame) -> Picture:
     n = frame.count()
     k = rendered.k[n > 0]
@@ -226,6 +247,7 @@ def _measured(about: Picture, rendered: Rendered, frame: Frame) -> Picture:
         pool_bytes=rendered.pool_bytes,
         pixel_bytes=rendered.pixel_bytes,
         total_bytes=rendered.total_bytes,
+        fits=fits(rendered.pool_bytes),
         skips={what: count for what, count in skips.items() if count},
     )
 

@@ -111,9 +111,7 @@ def _replay(folder: Path, plan: Plan) -> Replay | None:
     check_labels(
         f"The data set {folder}",
         _settings(dataset.index.labels, dataset.index.sampling),
-        _settings(
-            Labels(tail=plan.tail, g=plan.g, metric=METRIC, k_min=1, weights=plan.weights), Sampling(seed=plan.seed)
-        ),
+        _settings(Labels(tail=plan.tail, g=plan.g, metric=METRIC, weights=plan.weights), Sampling(seed=plan.seed)),
         "Give the build its --tail, --g, --seed and --weights, or another data set with --replay.",
     )
     return Replay(dataset, entries)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+from schemas.limits import LIMITS
 from schemas.measurement import Measurement
 
 BUNDLE = "kbuffer-deep"
@@ -26,6 +27,8 @@ TITLES = {
 MSE_FLOOR = 1e-8
 """Means and ratios take smaller errors as this one, the last digit that tables show (0.001e-5): below it, pictures
 differ by single steps in a few pixels and a ratio would measure rounding."""
+UNFIT = "†"
+"""Mark of a pool that does not fit; see `said_unfit`."""
 
 
 def technique_order(techniques: Iterable[str]) -> list[str]:
@@ -166,3 +169,9 @@ def number(value: float | None) -> str:
         return f"{value:.2e}"
     exponent = int(f"{value:.2e}".partition("e")[2])  # after rounding: 0.9999 has that of 1.00
     return f"{value:.{max(0, 2 - exponent)}f}"
+
+
+def said_unfit() -> str:
+    """What `UNFIT` means."""
+    most = LIMITS.buffer_bytes / 2**20
+    return f"does not fit one storage buffer ({most:.0f} MiB): rendered in bands of rows, or not at all"

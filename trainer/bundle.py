@@ -60,7 +60,6 @@ class Description:
         name: Name of the bundle.
         tail: Tail that the error curves were made with.
         metric: Where their error was measured.
-        k_min: Fewest core fragments that they allow.
         provenance: Where the bundle comes from.
         evaluation: What was measured on held-out scenes.
     """
@@ -68,7 +67,6 @@ class Description:
     name: str
     tail: TailSpec
     metric: MetricName
-    k_min: int
     provenance: Provenance
     evaluation: dict[str, JsonValue]
 
@@ -138,7 +136,6 @@ def write_bundle(
         layers=specs,
         tail=description.tail,
         metric=description.metric,
-        k_min=description.k_min,
         files=files,
         onnx=OnnxSpec(opset=OPSET, ir_version=IR_VERSION),
         self_test=self_test(weights, features, files),

@@ -6,7 +6,7 @@ from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from renderer.features import FEATURES
+from renderer.features import FEATURES, reads_colours
 from schemas.network import NetworkSize
 from trainer.dataset import GROUP
 
@@ -19,16 +19,13 @@ PRESETS: Final[dict[Preset, dict[str, Any]]] = {
 }
 """Settings of each preset that differ from the defaults; what else a preset decides is in `trainer.heads`."""
 
-_ALPHA: Final = ("alpha_mean", "alpha_std", "rgb_alpha_r", "rgb_alpha_g", "rgb_alpha_b", "depth_std")
-_FRONT: Final = tuple(name for name in FEATURES if name.startswith("front_"))
-
 SIZES: Final[dict[NetworkSize, dict[str, Any]]] = {
-    "tiny": {"hidden": (16, 8), "features": ("log_n", "optical_depth", *_FRONT)},
-    "small": {"features": tuple(name for name in FEATURES if name not in _ALPHA)},
+    "tiny": {"hidden": (16, 8), "features": tuple(name for name in FEATURES if not reads_colours([name]))},
+    "small": {},
     "full": {"hidden": (64, 32), "steps": 4000},
 }
-"""Settings of each size that differ from the defaults (benchmarks/PREDICTORS.md). `tiny` reads what a binned tail keeps
-of a pixel anyway, `small` leaves out the sums that gain nothing beside depth bins, `full` reads all."""
+"""Settings of each size that differ from the defaults; `benchmarks.predictors` measures them. `tiny` reads the depth
+bins and what a frame has anyway, so that no colours are gathered."""
 
 
 class TrainConfig(BaseModel):

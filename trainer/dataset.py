@@ -37,17 +37,19 @@ AnyView = TypeVar("AnyView")
 
 @dataclass(frozen=True)
 class PaperInputs:
-    """What DHOIT's network reads beside the colours (METHOD.md section 4), and the budgets of its labels.
+    """What DHOIT's network reads of the rows (METHOD.md section 4), and the budgets of its labels.
 
     Attributes:
         depth: float32 [R, 2], window depth of the nearest and of the farthest fragment.
-        scene_depth: The same of the whole view.
+        colours: float32 [R, 6], mean and nearest stored RGB, 0 to 1.
+        scene_depth: Window depth of the whole view's nearest and farthest fragment.
         fragments: N, fragments of the view.
         pixels: Pixels of the view.
         budgets: F of each of the view's `anchors`.
     """
 
     depth: NDArray[np.float32]
+    colours: NDArray[np.float32]
     scene_depth: tuple[float, float]
     fragments: int
     pixels: int
@@ -62,7 +64,6 @@ class ViewData:
         asset: What the view shows; assets are weighted equally.
         features: float32 [R, C], columns `renderer.features.FEATURES`.
         n: float32 [R], fragments.
-        k_min: Fewest core fragments.
         offsets: int64 [R+1], segments of row r are `offsets[r]:offsets[r+1]`.
         slopes: float32 [S], error gained per fragment, > 0, falling in a row.
         lengths: float32 [S], fragments of a segment.
@@ -78,7 +79,6 @@ class ViewData:
     asset: str
     features: NDArray[np.float32]
     n: NDArray[np.float32]
-    k_min: int
     offsets: NDArray[np.int64]
     slopes: NDArray[np.float32]
     lengths: NDArray[np.float32]
@@ -120,7 +120,8 @@ class ViewData:
             slopes=self.slopes[segments],
             lengths=self.lengths[segments],
             sampled_pixels=self.sampled_pixels * len(chosen) / max(1, self.rows),
-            paper=self.paper and replace(self.paper, depth=self.paper.depth[chosen]),
+            paper=self.paper
+            and replace(self.paper, depth=self.paper.depth[chosen], colours=self.paper.colours[chosen]),
         )
 
     def moments(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -131,7 +132,7 @@ class ViewData:
         """sha256 over what is trained on."""
         hasher = hashlib.sha256(self.asset.encode())
         arrays = [self.features, self.n, self.offsets, self.slopes, self.lengths, self.anchors]
-        for array in arrays + ([self.paper.depth] if self.paper is not None else []):
+        for array in arrays + ([self.paper.depth, self.paper.colours] if self.paper is not None else []):
             hasher.update(np.ascontiguousarray(array).tobytes())
         return hasher.digest()
 
@@ -166,7 +167,6 @@ class Batch:
     Attributes:
         features: float32 [B, F].
         n: float32 [B].
-        k_min: float32 [B].
         slopes: float32 [B, SEGMENTS], 0 where a hull has ended.
         lengths: float32 [B, SEGMENTS], 0 where a hull has ended.
         log_lambda: float32 [B], one price per group.
@@ -176,7 +176,6 @@ class Batch:
 
     features: NDArray[np.float32]
     n: NDArray[np.float32]
-    k_min: NDArray[np.float32]
     slopes: NDArray[np.float32]
     lengths: NDArray[np.float32]
     log_lambda: NDArray[np.float32]
@@ -202,7 +201,7 @@ def load_shards(paths: Sequence[Path], assets: Sequence[str], threads: int | Non
     """
     shards = zip(paths, assets, strict=True)
     read = read_ahead(lambda item: view_data(read_shard(item[0]), item[1]), shards, threads)
-    return refuse_empty([view for view in read if view.rows])
+    return refuse_empty([view for view in read if len(view.slopes)])
 
 
 def refuse_empty(views: list[AnyView]) -> list[AnyView]:
@@ -226,7 +225,6 @@ def view_data(shard: Shard, asset: str) -> ViewData:
         asset,
         features=shard.features,
         n=shard.n,
-        k_min=shard.k_min,
         hull=(shard.hull_offsets, shard.hull_k, shard.hull_error),
         price_range=shard.price_range,
         anchors=shard.anchors,
@@ -239,7 +237,6 @@ def make_view(
     *,
     features: NDArray[np.float32],
     n: NDArray[np.int32],
-    k_min: int,
     hull: tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32]],
     price_range: tuple[float, float],
     anchors: Sequence[float],
@@ -251,7 +248,6 @@ def make_view(
         asset: What the view shows.
         features: float32 [R, C].
         n: int32 [R], fragments.
-        k_min: Fewest core fragments.
         hull: Offsets int64 [R+1], k int32 [M] and error float32 [M] of the hulls' vertices.
         price_range: Natural logarithms of the least and the greatest lambda that matter.
         anchors: log lambda at the budgets that are scored.
@@ -272,7 +268,6 @@ def make_view(
         asset=asset,
         features=features,
         n=n.astype(np.float32),
-        k_min=k_min,
         offsets=offsets,
         slopes=slopes,
         lengths=lengths,
@@ -307,7 +302,7 @@ def sample_batch(
     total = max(1, size // GROUP)
     groups = len(range(how.rank, total, how.size))
     features = np.empty((groups * GROUP, len(columns)), dtype=np.float32)
-    n, k_min, log_lambda = (np.empty(groups * GROUP, dtype=np.float32) for _ in range(3))
+    n, log_lambda = (np.empty(groups * GROUP, dtype=np.float32) for _ in range(2))
     slopes, lengths = (np.zeros((groups * GROUP, SEGMENTS), dtype=np.float32) for _ in range(2))
     scale = np.empty(groups, dtype=np.float32)
     for g, view, rng in draw_views(views, seed, total, how):
@@ -321,10 +316,10 @@ def sample_batch(
         if len(how.noise):
             noise = np.random.default_rng((*seed, g)).standard_normal((GROUP, len(columns)), dtype=np.float32)
             features[part] += how.noise * noise
-        n[part], k_min[part], log_lambda[part] = view.n[rows], view.k_min, price
+        n[part], log_lambda[part] = view.n[rows], price
         pad_segments(view.offsets, view.slopes, view.lengths, rows, slopes[part], lengths[part])
         scale[own] = np.exp(np.interp(price, view.price_grid, np.log(view.scale_grid)))
-    return Batch(features, n, k_min, slopes, lengths, log_lambda, scale, groups / total)
+    return Batch(features, n, slopes, lengths, log_lambda, scale, groups / total)
 
 
 def draw_views(

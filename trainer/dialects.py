@@ -121,7 +121,7 @@ def common(expression: str) -> str:
     """
     end = 0
     for token in _TOKEN.finditer(expression):
-        if token.start() != end or (token["name"] and token["name"] not in COMMON | {"inv_n"}):
+        if token.start() != end or (token["name"] and token["name"] not in COMMON | {"inv_d"}):
             break
         end = token.end()
     if end != len(expression):
@@ -153,7 +153,7 @@ def _features_wgsl(names: Sequence[str]) -> str:
             "    if (s[0].x < 0.5) {",
             "        return array<f32, DIAPHANE_FEATURES>();",
             "    }",
-            "    let inv_n = 1.0 / s[0].x;",
+            "    let inv_d = 1.0 / s[0].y;",
             "    return array<f32, DIAPHANE_FEATURES>(",
             *values,
             "    );",

@@ -71,8 +71,8 @@ def score_allocation(view: ViewData, log_lambda: float, allocate: Callable[[int]
         log_lambda: Natural logarithm of the price.
         allocate: Counts of the rows, int32 [R], from the fragments that they may have.
     """
-    budget, optimum = _optimum(view.offsets, view.slopes, view.lengths, view.k_min, float(np.exp(log_lambda)))
-    error = _hull_error(view.offsets, view.slopes, view.lengths, view.k_min, allocate(budget))
+    budget, optimum = _optimum(view.offsets, view.slopes, view.lengths, float(np.exp(log_lambda)))
+    error = _hull_error(view.offsets, view.slopes, view.lengths, allocate(budget))
     floor = lossless_error(view.sampled_pixels)
     return BudgetScore(view.asset, log_lambda, budget, error, optimum, (error + floor) / (optimum + floor))
 
@@ -105,7 +105,7 @@ def _allocation(weights: Weights, view: ViewData, fill: Fill) -> Allocate:
         return lambda level, budget: importance_counts(weights, view, level, budget, fill)
     a, b = weights.predict(view.features)
     n = view.n.astype(np.int32)
-    return lambda level, budget: solve_lambda(a, b, n, budget, view.k_min)[0]
+    return lambda level, budget: solve_lambda(a, b, n, budget)[0]
 
 
 @numba.njit(cache=True)
@@ -113,11 +113,10 @@ def _optimum(
     offsets: NDArray[np.int64],
     slopes: NDArray[np.float32],
     lengths: NDArray[np.float32],
-    k_min: int,
     price: float,
 ) -> tuple[int, float]:
     """Fragments that the optimum spends on the rows at a price, and the error that is left."""
-    spent, left = float((len(offsets) - 1) * k_min), 0.0
+    spent, left = 0.0, 0.0
     for j in range(len(slopes)):
         if slopes[j] > price:
             spent += lengths[j]
@@ -131,13 +130,12 @@ def _hull_error(
     offsets: NDArray[np.int64],
     slopes: NDArray[np.float32],
     lengths: NDArray[np.float32],
-    k_min: int,
     k: NDArray[np.int32],
 ) -> float:
     """Sum over the rows of their hulls at counts k."""
     total = 0.0
     for r in range(len(k)):
-        covered = float(k[r] - k_min)
+        covered = float(k[r])
         for j in range(offsets[r], offsets[r + 1]):
             total += slopes[j] * max(0.0, lengths[j] - max(0.0, covered))
             covered -= lengths[j]

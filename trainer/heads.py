@@ -168,15 +168,12 @@ def batch_loss(network: Network, batch: Batch, config: TrainConfig) -> Tensor:
     `log(1 + mean r / mean (E* / lambda))` is the logarithm of a view's Lagrangian over its optimum's, which is what
     is scored.
     """
-    features, n, k_min, slopes, lengths, log_lambda, scale = (
+    features, n, slopes, lengths, log_lambda, scale = (
         torch.from_numpy(array)
-        for array in (
-            *(batch.features, batch.n, batch.k_min, batch.slopes, batch.lengths),
-            *(batch.log_lambda, batch.scale),
-        )
+        for array in (batch.features, batch.n, batch.slopes, batch.lengths, batch.log_lambda, batch.scale)
     )
     a, b = network(features).unbind(dim=1)
-    regret, overshoot = lagrangian_regret(a, b, n, k_min, slopes, lengths, log_lambda)
+    regret, overshoot = lagrangian_regret(a, b, n, slopes, lengths, log_lambda)
     rows = torch.log1p(torch.relu(regret)).mean()
     views = torch.log1p(torch.relu(regret.view(len(scale), -1).mean(dim=1)) / scale).mean()
     leak = torch.log1p(overshoot).mean()

@@ -10,12 +10,11 @@ def lagrangian_regret(
     a: Tensor,
     b: Tensor,
     n: Tensor,
-    k_min: Tensor,
     slopes: Tensor,
     lengths: Tensor,
     log_lambda: Tensor,
 ) -> tuple[Tensor, Tensor]:
-    """Regret of `k = clamp(1 + (a - log lambda) / b, k_min, n)` (METHOD.md section 4).
+    """Regret of `k = clamp(1 + (a - log lambda) / b, 0, n)` (METHOD.md section 4).
 
     `r = (E(k) + lambda k - min_j (E(j) + lambda j)) / lambda` with E the lower hull of the pixel's error curve,
     interpolated: `E(k) = sum_j s_j (len_j - clamp(k - k_j, 0, len_j))`. The optimum takes exactly the segments
@@ -26,7 +25,6 @@ def lagrangian_regret(
         a: float32 [R], predicted log gain of the first fragment.
         b: float32 [R], predicted fall of the log gain per fragment, > 0.
         n: float32 [R], fragments.
-        k_min: float32 [R], fewest core fragments: where the hull begins.
         slopes: float32 [R, H], error gained per fragment, falling along H; 0 where a hull has ended.
         lengths: float32 [R, H], fragments of each segment; 0 where a hull has ended.
         log_lambda: float32 [R], natural logarithm of the price.
@@ -37,13 +35,13 @@ def lagrangian_regret(
             the gradient that the clamp hides.
     """
     wanted = 1.0 + (a - log_lambda) / b
-    k = torch.minimum(torch.maximum(wanted, k_min), n)
+    k = torch.minimum(torch.relu(wanted), n)
     ratio = slopes * torch.exp(-log_lambda)[:, None]
     taken = lengths * (ratio > 1.0)
-    start = k_min[:, None] + torch.cumsum(lengths, dim=1) - lengths
+    start = torch.cumsum(lengths, dim=1) - lengths
     covered = torch.minimum(torch.clamp(k[:, None] - start, min=0.0), lengths)
-    best = k_min + taken.sum(dim=1)
+    best = taken.sum(dim=1)
     r = (ratio * (taken - covered)).sum(dim=1) + (k - best)
     above = torch.relu(wanted - n) * (best < n)
-    below = torch.relu(k_min - wanted) * (best > k_min)
+    below = torch.relu(-wanted) * (best > 0)
     return r, above + below

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.allocation.fill import budget_fill, paper_fill
-from renderer.features import FEATURES
 from schemas.fragments import FragmentDump
 from schemas.problem import Problem
 from trainer.dataset import GROUP, Drawing, PaperInputs, ViewData, draw_views
@@ -25,14 +24,11 @@ from trainer.weights import Weights
 Fill = Literal["paper", "budget"]
 """`paper`: Eq. 3, floor alone; `budget`: floor, clamp, and the remainder by largest fraction."""
 
-_COLOURS: Final = tuple(f"{name}_{c}" for name in ("rgb_mean", "rgb_nearest") for c in "rgb")
 PAPER_FEATURES: Final = (
     *("n_share", "budget_share", "depth_near", "depth_far", "scene_depth_near", "scene_depth_far"),
-    *_COLOURS,
+    *(f"{name}_{c}" for name in ("rgb_mean", "rgb_nearest") for c in "rgb"),
 )
 """n / N, F / N, window depth of the pixel's nearest and farthest fragment and of the view's, mean and nearest RGB."""
-
-_COLUMNS: Final = [FEATURES.index(name) for name in _COLOURS]
 
 LABEL_PEAK: Final = 16.0
 """A repaired label is 1 where a pixel gets this many times the mean share of a pixel, and beyond."""
@@ -60,6 +56,7 @@ def with_paper_inputs(
         view,
         paper=PaperInputs(
             depth=_window(depth, near, far).astype(np.float32),
+            colours=_colours(dump, first, last + 1),
             scene_depth=(float(bounds[0]), float(bounds[1])),
             fragments=dump.total,
             pixels=dump.pixels,
@@ -79,7 +76,7 @@ def paper_inputs(view: ViewData, rows: NDArray[np.int64] | slice, budget: int) -
     x = np.empty((len(n), len(PAPER_FEATURES)), dtype=np.float32)
     x[:, 0], x[:, 1] = n / about.fragments, budget / about.fragments
     x[:, 2:4], x[:, 4:6] = about.depth[rows], about.scene_depth
-    x[:, 6:] = view.features[rows][:, _COLUMNS]
+    x[:, 6:] = about.colours[rows]
     return x
 
 
@@ -113,7 +110,7 @@ def paper_batch(
             about = _about(view)
             inputs.append(paper_inputs(view, rows, about.budgets[level]))
             price = float(np.exp(view.anchors[level]))
-            counts.append(_optimal_counts(view.offsets, view.slopes, view.lengths, view.k_min, price, rows))
+            counts.append(_optimal_counts(view.offsets, view.slopes, view.lengths, price, rows))
             budgets.append(np.tile(np.array([[about.budgets[level], about.pixels]], np.float32), (GROUP, 1)))
     return np.concatenate(inputs), np.concatenate(counts), np.concatenate(budgets), len(inputs) / total
 
@@ -131,20 +128,27 @@ def importance_counts(weights: Weights, view: ViewData, level: int, budget: int,
         view: The view.
         level: Which of its anchors: the network reads the whole view's budget.
         budget: Fragments for these rows.
-        fill: From importances to counts. `paper` may give more than n, which is cut off, and less than k_min, whose
-            error is taken for that of k_min: rows know no other. So it is shown better than it is.
+        fill: From importances to counts. `paper` may give more than n, which is cut off.
     """
     inputs = paper_inputs(view, slice(None), _about(view).budgets[level])
     importance = weights.answer(inputs)[:, 0]
     n = view.n.astype(np.int32)
     if fill == "budget":
-        return budget_fill(importance, n, budget, view.k_min)
-    return np.clip(paper_fill(importance, budget), np.minimum(view.k_min, n), n).astype(np.int32)
+        return budget_fill(importance, n, budget)
+    return np.minimum(paper_fill(importance, budget), n)
 
 
 def _window(depth: NDArray[np.floating], near: float, far: float) -> NDArray[np.float64]:
     """`gl_FragCoord.z` of a depth along the view axis, in [0, 1] from the near to the far plane."""
     return np.asarray((1.0 - near / depth.astype(np.float64)) * (far / max(far - near, 1e-30)))
+
+
+def _colours(dump: FragmentDump, first: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.float32]:
+    """float32 [R, 6], mean and nearest stored RGB / 255 of some lists, none of them empty."""
+    before = np.zeros((dump.total + 1, 3))
+    np.cumsum(dump.rgba[:, :3] / 255.0, axis=0, out=before[1:])
+    mean = (before[end] - before[first]) / (end - first)[:, None]
+    return np.concatenate([mean, dump.rgba[first, :3] / 255.0], axis=1).astype(np.float32)
 
 
 def _about(view: ViewData) -> PaperInputs:
@@ -161,12 +165,11 @@ def _optimal_counts(
     offsets: NDArray[np.int64],
     slopes: NDArray[np.float32],
     lengths: NDArray[np.float32],
-    k_min: int,
     price: float,
     rows: NDArray[np.int64],
 ) -> NDArray[np.float32]:
     """What the optimum keeps of some rows at a price: every hull segment that gains more."""
-    counts = np.full(len(rows), k_min, dtype=np.float32)
+    counts = np.zeros(len(rows), dtype=np.float32)
     for i in range(len(rows)):
         for j in range(offsets[rows[i]], offsets[rows[i] + 1]):
             if slopes[j] > price:

@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.depth_bins import MOST_BINS
 from renderer.features import derive, gather
 from schemas.bundle import HALF_FILES, ONNX, SHADERS, SelfTest
 from schemas.fragments import FragmentDump
@@ -75,7 +74,7 @@ def pixel_sums() -> NDArray[np.float32]:
         background=rng.integers(0, 256, (PIXELS, 3), dtype=np.uint8),
         facing=np.zeros(PIXELS, dtype=np.uint8),
     )
-    return gather(dump, MOST_BINS)
+    return gather(dump, "binned-16")
 
 
 def _rows(values: NDArray[np.float32]) -> tuple[tuple[float, ...], ...]:

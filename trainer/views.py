@@ -144,7 +144,7 @@ def open_views(
     """
     listed = zip(shards, assets, headers or [None] * len(shards), strict=True)
     found = read_ahead(lambda item: _outlined(*item), listed, READERS)
-    return refuse_empty([view for view in found if view.rows])
+    return refuse_empty([view for view in found if view is not None])
 
 
 class Pool:
@@ -202,11 +202,13 @@ class Pool:
         return [number for same in by_place for number in rng.permutation(same).tolist()]
 
 
-def _outlined(path: Path, asset: str, header_sha256: str | None) -> ShardView:
+def _outlined(path: Path, asset: str, header_sha256: str | None) -> ShardView | None:
+    """A shard's view; None where no row has anything to gain."""
     view = view_data(read_shard(path, header_sha256), asset)
-    statistics = moments(view.features) if view.rows else (np.zeros(0), np.zeros(0))
+    if not len(view.slopes):
+        return None
     outline = replace(view.part(np.zeros(0, dtype=np.int64)), sampled_pixels=view.sampled_pixels)
-    return ShardView(path, header_sha256, outline, view.rows, statistics, view.digest())
+    return ShardView(path, header_sha256, outline, view.rows, moments(view.features), view.digest())
 
 
 def _runs(chosen: NDArray[np.int64], rows: int) -> list[tuple[int, int]]:

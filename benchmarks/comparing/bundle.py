@@ -1,92 +1,185 @@
-"""A bundle for the suite, trained on none of its scenes.
+"""The project's pretrained bundle, trained on none of the suite's scenes and on none whose licence forbids to ship it.
 
-python -m benchmarks.comparing.bundle FOLDER --scenes ../shared/scenes --work WORK
+python -m benchmarks.comparing.bundle FOLDER --scenes ../shared/scenes --scenes ../shared/training-scenes --work WORK
 
-Views, labels and their keeping are those of `benchmarks.predictors`; both can share `--work`, one after the other.
+A stage is captured as authored, with one opacity for all surfaces, and with an opacity of its own for each material;
+its training rows stay in `--work`.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
+from benchmarks.casting.cases import Case, described_cases
 from benchmarks.comparing.scenes import SHARED
-from benchmarks.predicting.labels import labels_of
-from benchmarks.predicting.store import Store
-from benchmarks.predicting.views import ViewRow, views_of
-from labeller.shards import read_shard
+from labeller.curves import error_curves, whole_bins
+from labeller.hull import lower_hulls
+from labeller.shards import read_shard, write_shard
+from renderer.capture import capture
 from renderer.context import gl_context
-from renderer.samples import SAMPLES
+from renderer.frame import Frame
+from renderer.gpu_scene import GpuScene
+from renderer.opacities import drawn_opacities
+from renderer.scene import LoadOptions, load_scene, scene_digest
 from schemas.bundle import Provenance, TailSpec
 from schemas.network import DEFAULT_NETWORK, SIZES, NetworkSize
-from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAILS, TailName
+from schemas.problem import Problem
+from schemas.scene import SceneArrays
+from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, DENSITY_G, TailName
 from services.versions import commit, machine
 from trainer.bundle import Description, export_bundle
 from trainer.config import TrainConfig
-from trainer.dataset import view_data
+from trainer.dataset import ViewData, view_data
 from trainer.train import train
 
-SIZE = (715, 480)
-VIEWS = 2
+SIZE: Final = (715, 480)
+VIEWS: Final = 2
 """Of a stage, in each mode."""
-_PARITY_ROWS = 100_000
+STAGES: Final = 3
+"""Most stages of a scene: some have many small ones, and every asset weighs the same anyway."""
+MODES: Final = ("authored", "alpha .33", "materials")
+MULTIPLES: Final = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
+"""Budgets that prices are drawn near, as multiples of width x height, where they hold no more than HELD of N."""
+HELD: Final = 0.95
+LEAST_FRAGMENTS: Final = 0.15
+"""Views with fewer fragments a pixel teach little."""
+FORBIDDEN: Final = ("NC", "none stated", "no further terms")
+"""What a licence says that does not let a company ship what was trained on a scene."""
+_PARITY_ROWS: Final = 100_000
 
 
-def main() -> int:
-    """Trains and exports."""
-    given = _parse()
-    store = Store(given.work)
-    rows = [row for row in views_of(store, given.scenes, SIZE, VIEWS) if row.asset not in {*SHARED, *SAMPLES}]
-    if not rows:
-        print("There is no scene to train on beside those of the suite.", file=sys.stderr)
-        return 1
-    export(store, rows, given.network, given.tail, given.folder)
-    print(given.folder)
-    return 0
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A scene that may be trained on.
+
+    Attributes:
+        case: One of its stages.
+        licence: As its description states it.
+    """
+
+    case: Case
+    licence: str
 
 
-def export(store: Store, rows: list[ViewRow], network: NetworkSize, tail: TailName, folder: Path) -> None:
-    """Train on views and write the bundle.
+def sources(folders: list[Path]) -> Iterator[Source]:
+    """The stages that may be trained on, and under which licence."""
+    for folder in folders:
+        described = json.loads((folder / "MANIFEST.json").read_text(encoding="utf-8"))["scenes"]
+        licences = {scene["name"]: str(scene["licence"]) for scene in described}
+        seen: dict[str, int] = {}
+        for case in described_cases(folder):
+            licence = licences[case.scene]
+            seen[case.scene] = seen.get(case.scene, 0) + 1
+            if case.scene in SHARED or seen[case.scene] > STAGES or any(word in licence for word in FORBIDDEN):
+                continue
+            yield Source(case, licence)
+
+
+def rows_of(case: Case, tail: TailName, work: Path) -> list[ViewData]:
+    """Training rows of a stage in every mode; what was labelled before is read."""
+    found = []
+    for mode in MODES:
+        done = work / f"{case.scene}-{case.path.stem}-{mode}-{tail}.json".replace(" ", "")
+        if not done.exists():
+            names = [str(path.name) for path in _label(case, mode, tail, work)]
+            done.write_text(json.dumps(names), encoding="utf-8")
+        found += [view_data(read_shard(work / name), case.scene) for name in json.loads(done.read_text("utf-8"))]
+    return [view for view in found if view.rows]
+
+
+def _label(case: Case, mode: str, tail: TailName, work: Path) -> Iterator[Path]:
+    print(f"{case.scene} {case.path.name} {mode}", file=sys.stderr, flush=True)
+    try:
+        scene = _loaded(case, mode)
+    except Problem as problem:
+        print(problem.title, file=sys.stderr, flush=True)
+        return
+    if scene.is_opaque:
+        return
+    gpu = GpuScene(gl_context(), scene)
+    for number, view in enumerate(case.cameras(scene, VIEWS)):
+        dump = capture(Frame(gpu, view, *SIZE)).dump
+        if dump.total < LEAST_FRAGMENTS * dump.pixels:
+            continue
+        curves = whole_bins(dump, error_curves(dump, tail))
+        budgets = [int(m * dump.pixels) for m in MULTIPLES if m * dump.pixels < HELD * dump.total]
+        path = work / f"{case.scene}-{case.path.stem}-{mode}-{tail}-{number}.safetensors".replace(" ", "")
+        write_shard(path, dump, curves, lower_hulls(curves), budgets)
+        yield path
+
+
+def _loaded(case: Case, mode: str) -> SceneArrays:
+    if mode == "materials":
+        scene = load_scene(case.path, LoadOptions(alpha=0.5, variants=case.variants))
+        return drawn_opacities(scene, seed=sum(map(ord, case.scene)))
+    return load_scene(case.path, LoadOptions(alpha=0.33 if mode != "authored" else None, variants=case.variants))
+
+
+def export(chosen: list[Source], network: NetworkSize, tail: TailName, work: Path, folder: Path) -> None:
+    """Train and write the bundle.
 
     Args:
-        store: Where labels are kept.
-        rows: The views.
+        chosen: What to train on.
         network: Size of the network.
         tail: That the bundle is for.
+        work: Where labels are kept.
         folder: The bundle.
     """
-    shards = [read_shard(labels_of(store, row, tail).shard) for row in rows]
-    views = [view_data(shard, row.asset) for shard, row in zip(shards, rows, strict=True) if len(shard.n)]
+    work.mkdir(parents=True, exist_ok=True)
+    views = [view for source in chosen for view in rows_of(source.case, tail, work)]
     config = TrainConfig.sized(network)
     result = train(views, (), config)
     features = np.concatenate([view.features for view in views])
+    taught = {view.asset for view in views}
     description = Description(
-        name=f"suite-{network}",
+        name=f"pretrained-{network}",
         tail=TailSpec(name=tail, g=DENSITY_G),
         metric="display",
-        k_min=1,
         provenance=Provenance(
-            scenes={row.asset: row.digest for row in rows},
+            scenes={s.case.scene: scene_digest(s.case.path) for s in chosen if s.case.scene in taught},
             code_version=commit() or "unknown",
             seed=config.seed,
             machine=", ".join(machine().values()),
-            settings={"training": config.model_dump(mode="json"), "views": len(views)},
+            settings={
+                "training": config.model_dump(mode="json"),
+                "views": len(views),
+                "licences": {s.case.scene: s.licence for s in chosen if s.case.scene in taught},
+            },
         ),
         evaluation={"training": {"over_optimum": result.score}},
     )
     export_bundle(folder, result.weights, description, features[:: max(1, len(features) // _PARITY_ROWS)], gl_context())
 
 
+def main() -> int:
+    """Trains and exports."""
+    given = _parse()
+    chosen = list(sources(given.scenes))
+    if not chosen:
+        print("There is no scene to train on beside those of the suite.", file=sys.stderr)
+        return 1
+    export(chosen, given.network, given.tail, given.work, given.folder)
+    print(given.folder)
+    return 0
+
+
 def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="Where the bundle goes.")
-    parser.add_argument("--scenes", type=Path, required=True, help="Folder with MANIFEST.json.")
-    parser.add_argument("--work", type=Path, required=True, help="Where dumps and labels are kept.")
+    parser.add_argument(
+        "--scenes", type=Path, required=True, action="append", help="Folder with MANIFEST.json; repeatable."
+    )
+    parser.add_argument("--work", type=Path, required=True, help="Where labels are kept.")
     parser.add_argument("--network", choices=SIZES, default=DEFAULT_NETWORK)
-    parser.add_argument("--tail", choices=TAILS, default=DEFAULT_TAIL)
+    parser.add_argument("--tail", choices=BINNED_TAILS, default=DEFAULT_TAIL)
     return parser.parse_args()
 
 

@@ -11,12 +11,15 @@ from services.bench.bars import error_bars
 from services.bench.cells import bundle_of
 from services.bench.groups import Group, groups_of, said_setting
 from services.bench.page import said_machines
+from services.summary import UNFIT, said_unfit
 
 PAPER = ("minecraft_village_caves", 2.0), ("sponza", 4.0)
 """DHOIT's two rows of Tables 1 and 2: Vokselia Spawn at M = 20 MB, here another voxel scene at F = 2 WH, and Crytek
 Sponza at 40 MB, F = 4 WH."""
 LEARNED = "kbuffer-deep"
 """The technique whose losses the page lists."""
+DEEP_FROM = 5.0
+"""N / WH from which on a view counts as deep."""
 FACTORS = (2.0, 4.0)
 """Of Figure 6."""
 
@@ -82,8 +85,18 @@ def _driver(driver: str, result: BenchResult, drawn: Mapping[tuple[str, str], st
     )
     every = groups_of(views)
     parts.append(tables.winners(every))
+    if deep := [each for each in every if each.depth > DEEP_FROM]:
+        parts.append(f"On those with N > {DEEP_FROM:g} WH, for which a budget is smaller than all fragments:\n")
+        parts.append(tables.winners(deep))
     parts.append(f"Where `{LEARNED}` has more than {tables.ALIKE:g} times the least error of a budget:\n")
     parts.append(tables.losses(every, LEARNED))
+    parts.append("### How deep the scenes are\n")
+    parts.append(
+        "N: transparent fragments; D: those of the fullest pixel; occupied: pixels that have any. Then the total bytes "
+        f"that the exact techniques need for a frame; {UNFIT} {said_unfit()}. Peeling draws a scene D times: it is not "
+        "measured on the deep ones.\n"
+    )
+    parts.append(tables.depths(every))
     return parts
 
 

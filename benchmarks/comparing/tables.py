@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from benchmarks.markdown import table
+from renderer.techniques import TECHNIQUES
 from schemas.bench import Basis, BenchView
 from services.bench.groups import (
     ORACLE_WORDS,
@@ -19,7 +20,7 @@ from services.bench.groups import (
     said_technique,
     title_of,
 )
-from services.summary import geometric_mean, number
+from services.summary import UNFIT, geometric_mean, mean, number
 
 FEATURES, IMPORTANCE, BUFFER, READBACK = "feature extraction", "importance", "k-buffer", "readback"
 STAGES = (FEATURES, IMPORTANCE, BUFFER, READBACK)
@@ -37,6 +38,25 @@ def stage_of(name: str) -> str:
     if name in _BUFFER:
         return BUFFER
     return FEATURES if name.startswith("gather") else IMPORTANCE
+
+
+def depths(groups: Sequence[Group]) -> str:
+    """How deep each scene is, and the bytes that each exact technique needs for it, in one go."""
+    exact = [name for name, entry in TECHNIQUES.items() if entry.family == "exact"]
+    lines = []
+    for each in sorted(groups, key=lambda group: group.depth):
+        needed = {row.key.technique: row for row in each.rows if row.key.technique in exact}
+        occupied = mean([view.occupied / (view.width * view.height) for view in each.views]) or 0.0
+        most = max(view.most for view in each.views)
+        cells = [_needed(needed.get(name)) for name in exact]
+        lines.append([each.title, f"{each.depth:.1f}", most, f"{100.0 * occupied:.0f} %", *cells])
+    return table(("scene", "N / WH", "D", "occupied", *(f"{name}, MiB" for name in exact)), lines)
+
+
+def _needed(row: Row | None) -> str:
+    if row is None or row.total_bytes is None:
+        return NOT_MEASURED
+    return f"{row.total_bytes / 2**20:.0f}" + ("" if row.fits else f" {UNFIT}")
 
 
 def errors(groups: Sequence[Group], factor: float) -> str:

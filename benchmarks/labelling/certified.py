@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from labeller.allocation import Allocation
 from labeller.curves import Curves, error_curves
 from labeller.rules import allocate_curves
-from renderer.allocation.fill import feasible_k_min
 from schemas.fragments import FragmentDump
 
 FACTORS: Final = (1, 2, 4)
@@ -34,7 +33,6 @@ class Verdict:
     Attributes:
         budget: F.
         name: The budget in words.
-        k_min: Fewest fragments of an occupied pixel.
         fragments: N.
         exact: Whether F >= N, so that nothing was decided.
         proven: Whether the labeller says that there is no better allocation at all.
@@ -48,7 +46,6 @@ class Verdict:
 
     budget: int
     name: str
-    k_min: int
     fragments: int
     exact: bool
     proven: bool
@@ -69,16 +66,11 @@ def budgets_of(dump: FragmentDump) -> dict[str, int]:
 
 
 def certify(dump: FragmentDump) -> Iterator[Verdict]:
-    """Every budget of a view with k_min 1 (0 where it does not cover that) and with k_min 0."""
+    """Every budget of a view."""
     curves = error_curves(dump)
     names = budgets_of(dump)
-    yield from _certify(dump, curves, names, 1)
-    yield from _certify(dump, curves, {n: f for n, f in names.items() if feasible_k_min(dump.counts, f)}, 0)
-
-
-def _certify(dump: FragmentDump, curves: Curves, names: dict[str, int], k_min: int) -> Iterator[Verdict]:
     budgets = list(names.values())
-    found = [allocate_curves(dump, curves, budgets, rule, k_min=k_min) for rule in ("optimal", "greedy", "increment")]
+    found = [allocate_curves(dump, curves, budgets, rule) for rule in ("optimal", "greedy", "increment")]
     for name, *allocations in zip(names, *found, strict=True):
         yield judge(dump, curves, name, *allocations)
 
@@ -99,7 +91,7 @@ def judge(
     others = {"greedy": greedy, "increment": increment}
     wrong = [line for allocation in (optimal, *others.values()) for line in _illegal(dump, curves, allocation)]
     error, claimed = optimal.error, optimal.bound
-    bound = 0.0 if optimal.exact else dual(curves, optimal.k_min, optimal.lam or 0.0, optimal.budget)
+    bound = 0.0 if optimal.exact else dual(curves, optimal.lam or 0.0, optimal.budget)
     # Above the dual bound there is only a proof that nothing better exists; then the error itself is the bound.
     highest = error if optimal.proven else bound
     if claimed is None or claimed > highest + _ROUNDING * (error + (optimal.lam or 0.0) * optimal.budget):
@@ -114,7 +106,6 @@ def judge(
     return Verdict(
         optimal.budget,
         name,
-        optimal.k_min,
         dump.total,
         optimal.exact,
         optimal.proven,
@@ -127,9 +118,9 @@ def judge(
     )
 
 
-def dual(curves: Curves, k_min: int, lam: float, budget: int) -> float:
-    """`sum_p min_k (e_p(k) + lam k) - lam F` over all k from min(k_min, n): below the error of every allocation."""
-    return float(_cheapest(curves.offsets, curves.error, k_min, lam).sum()) - lam * budget
+def dual(curves: Curves, lam: float, budget: int) -> float:
+    """`sum_p min_k (e_p(k) + lam k) - lam F` over all k from 0 to n: below the error of every allocation."""
+    return float(_cheapest(curves.offsets, curves.error, lam).sum()) - lam * budget
 
 
 def _illegal(dump: FragmentDump, curves: Curves, a: Allocation) -> list[str]:
@@ -137,20 +128,20 @@ def _illegal(dump: FragmentDump, curves: Curves, a: Allocation) -> list[str]:
     n, wrong = dump.counts, []
     if a.used != a.k.sum(dtype=np.int64) or a.used > a.budget:
         wrong.append(f"{a.rule} uses {a.k.sum(dtype=np.int64)}, says {a.used}, of {a.budget}")
-    if bool(((a.k < np.minimum(n, a.k_min)) | (a.k > n)).any()):
-        wrong.append(f"{a.rule} leaves k_min..n")
+    if bool(((a.k < 0) | (a.k > n)).any()):
+        wrong.append(f"{a.rule} leaves 0..n")
     if a.exact != (a.budget >= dump.total) or abs(curves.total(a.k) - a.error) > _ROUNDING * a.error:
         wrong.append(f"{a.rule} says error {a.error}, exact {a.exact}; it is {curves.total(a.k)}")
     return wrong
 
 
 @njit(parallel=True, cache=True, error_model="numpy")
-def _cheapest(offsets: NDArray[np.int64], error: NDArray[np.float32], k_min: int, lam: float) -> NDArray[np.float64]:
+def _cheapest(offsets: NDArray[np.int64], error: NDArray[np.float32], lam: float) -> NDArray[np.float64]:
     # Per pixel, for numpy's sum is pairwise: a running sum of a million values costs five digits.
     out = np.empty(len(offsets) - 1)
     for p in prange(len(offsets) - 1):
         first, n = offsets[p], offsets[p + 1] - offsets[p] - 1
         out[p] = np.inf
-        for k in range(min(k_min, n), n + 1):
+        for k in range(n + 1):
             out[p] = min(out[p], np.float64(error[first + k]) + lam * k)
     return out

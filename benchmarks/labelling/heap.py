@@ -20,20 +20,20 @@ _CHILDREN = 4
 """Of a node of the compiled heap: half the depth of a binary one, and a node's children share a cache line."""
 
 
-def python_heap(curves: Curves, budgets: Sequence[int], k_min: int) -> list[NDArray[np.int32]]:
+def python_heap(curves: Curves, budgets: Sequence[int], least: int) -> list[NDArray[np.int32]]:
     """The literal heap: `labeller.reference.heap_removal` over plain lists, for several budgets in one descent.
 
     Args:
         curves: Error curves of a view.
         budgets: F of each result, falling.
-        k_min: No pixel goes below `min(k_min, n)`.
+        least: No pixel goes below `min(least, n)`.
 
     Returns:
         int32 [P] for each budget.
     """
     error, start = curves.error.tolist(), curves.offsets[:-1].tolist()
     k: list[int] = curves.counts.tolist()
-    heap = [(error[start[p] + n - 1], p) for p, n in enumerate(k) if n > k_min]
+    heap = [(error[start[p] + n - 1], p) for p, n in enumerate(k) if n > least]
     heapq.heapify(heap)
     used, kept = sum(k), []
     for budget in budgets:
@@ -41,29 +41,29 @@ def python_heap(curves: Curves, budgets: Sequence[int], k_min: int) -> list[NDAr
             _, p = heapq.heappop(heap)
             k[p] -= 1
             used -= 1
-            if k[p] > k_min:
+            if k[p] > least:
                 heapq.heappush(heap, (error[start[p] + k[p] - 1], p))
         kept.append(np.array(k, dtype=np.int32))
     return kept
 
 
-def compiled_heap(curves: Curves, budgets: Sequence[int], k_min: int) -> list[NDArray[np.int32]]:
+def compiled_heap(curves: Curves, budgets: Sequence[int], least: int) -> list[NDArray[np.int32]]:
     """The same, compiled: 64-bit nodes (key above, pixel below) in a 4-ary heap whose top is replaced in place.
 
     Args:
         curves: Error curves of a view.
         budgets: F of each result, falling.
-        k_min: No pixel goes below `min(k_min, n)`.
+        least: No pixel goes below `min(least, n)`.
 
     Returns:
         int32 [P] for each budget.
     """
     counts, starts = curves.counts, curves.offsets[:-1]
-    pixels = np.flatnonzero(counts > k_min)
+    pixels = np.flatnonzero(counts > least)
     first = ascending_keys(curves.error[starts[pixels] + counts[pixels] - 1])
     heap = (first.astype(np.uint64) << np.uint64(32)) | pixels.astype(np.uint64)
     # Where in the curves a pixel is, and where it ends: together, so that a removal reads one line of them.
-    places = np.stack([starts + counts, starts + np.minimum(counts, k_min)], axis=1).astype(np.uint64)
+    places = np.stack([starts + counts, starts + np.minimum(counts, least)], axis=1).astype(np.uint64)
     out = np.empty((len(budgets), len(counts)), dtype=np.int32)
     _descend(curves.error, heap, np.array(budgets, dtype=np.int64), int(counts.sum()), starts, places, out)
     return list(out)

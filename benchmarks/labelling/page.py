@@ -93,7 +93,7 @@ def _certified(found: Found) -> str:
     width, height = found["size"]
     return (
         f"## Certificates\n\nEvery view of every scene at {width}x{height}, with opacity .33 of every surface and, "
-        "where a scene has transparency, with its own; F = W H x 1, 2, 4 and 25, 40, 60, 80 % of N; k_min 1 and 0. "
+        "where a scene has transparency, with its own; F = W H x 1, 2, 4 and 25, 40, 60, 80 % of N. "
         "A case is one budget below N. *Gap* is (error - bound) / max(error, 1e-9 a pixel), the bound computed anew "
         "from the curves and the price that the allocation names, not taken from it. *Proven* are the cases in "
         "which the labeller also shows that no allocation is better at all. *Greedy* and *increment*: the largest "

@@ -103,7 +103,7 @@ def _summary(lines: list[dict[str, Any]]) -> dict[str, Any]:
         "greedy": max((case["greedy"] for case in decided if case["greedy"]), default=None),
         "increment": max((case["increment"] for case in decided if case["increment"]), default=None),
         "wrong": [
-            f"{case['stage']}, {case['mode']}, {case['view']}, F = {case['name']}, k_min {case['k_min']}: {text}"
+            f"{case['stage']}, {case['mode']}, {case['view']}, F = {case['name']}: {text}"
             for case in cases
             for text in case["wrong"]
         ],

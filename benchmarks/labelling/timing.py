@@ -14,10 +14,9 @@ from benchmarks.labelling.heap import compiled_heap, python_heap
 from benchmarks.labelling.traffic import traffic
 from benchmarks.render.setup import in_turns
 from labeller.curves import Curves, error_curves, error_curves_by_g
-from labeller.greedy import Removals, removal_keys
+from labeller.greedy import Removals, least_kept, removal_keys
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
-from renderer.allocation.fill import feasible_k_min
 from schemas.fragments import FragmentDump
 from schemas.tail import METRICS, TAILS, MetricName, TailName
 
@@ -40,7 +39,7 @@ def steps(dump: FragmentDump, rounds: int) -> dict[str, Any]:
     """
     budgets = budgets_of(dump)
     curves = error_curves(dump)
-    hulls = lower_hulls(curves, feasible_k_min(dump.counts, budgets[0]))
+    hulls = lower_hulls(curves)
 
     def whole() -> None:
         allocate_curves(dump, error_curves(dump), budgets, "optimal")
@@ -49,7 +48,7 @@ def steps(dump: FragmentDump, rounds: int) -> dict[str, Any]:
         rounds,
         {
             "curves": lambda: error_curves(dump),
-            "hulls": lambda: lower_hulls(curves, hulls.k_min),
+            "hulls": lambda: lower_hulls(curves),
             "five budgets": lambda: allocate_curves(dump, curves, budgets, "optimal", hulls),
             "one budget": lambda: allocate_curves(dump, curves, budgets[1:2], "optimal", hulls),
             "all": whole,
@@ -76,7 +75,7 @@ def heaps(dump: FragmentDump, rounds: int) -> dict[str, Any]:
         `times` in milliseconds; `equal`: names of the heaps -> whether all k are those of `greedy`.
     """
     budgets = budgets_of(dump)[::-1]
-    k_min = feasible_k_min(dump.counts, budgets[-1])
+    least = least_kept("greedy", int(np.count_nonzero(dump.counts)), budgets[-1])
     curves = error_curves(dump)
     rules: dict[str, Callable[[Curves, Sequence[int], int], Sequence[NDArray[np.int32]]]] = {
         "greedy": selected,
@@ -87,7 +86,7 @@ def heaps(dump: FragmentDump, rounds: int) -> dict[str, Any]:
 
     def call(name: str) -> Callable[[], object]:
         def run() -> None:
-            kept[name] = rules[name](curves, budgets, k_min)
+            kept[name] = rules[name](curves, budgets, least)
 
         return run
 
@@ -100,14 +99,13 @@ def heaps(dump: FragmentDump, rounds: int) -> dict[str, Any]:
     return {
         "times": {**_together(first, second), "Python heap": {"median": python, "least": python}},
         "equal": {name: all(map(np.array_equal, kept[name], kept["greedy"])) for name in rules if name != "greedy"},
-        "k_min": k_min,
         "removals": dump.total - budgets[-1],
     }
 
 
-def selected(curves: Curves, budgets: Sequence[int], k_min: int) -> list[NDArray[np.int32]]:
+def selected(curves: Curves, budgets: Sequence[int], least: int) -> list[NDArray[np.int32]]:
     """int32 [P] for each budget, what the heaps compute, by `labeller.greedy`."""
-    keys = removal_keys(curves, k_min, "greedy")
+    keys = removal_keys(curves, least, "greedy")
     return Removals(lambda: (keys,)).keep(budgets)
 
 

@@ -13,6 +13,7 @@ from renderer.gpu_scene import GpuScene
 from renderer.scene import LoadOptions, load_scene
 from schemas.fragments import FragmentDump
 from schemas.problem import Problem
+from schemas.scene import SceneArrays
 
 SIZE = (1430, 960)
 
@@ -54,18 +55,44 @@ def captured_views(
         most: Most views of the stage, spread over those that are listed; None: all of them.
         known: Keys of the views to leave out.
     """
-    stage = str(case.path).rpartition(f"/{case.scene}/")[2]
     for mode, alpha in MODES.items():
         try:
             scene = load_scene(case.path, LoadOptions(alpha=alpha, variants=case.variants))
         except Problem as problem:
-            yield CapturedView(case.scene, stage, mode, "", None, problem.title)
+            yield CapturedView(case.scene, stage_of(case), mode, "", None, problem.title)
             return
-        if scene.is_opaque:
-            yield CapturedView(case.scene, stage, mode, "", None, "nothing in it is transparent")
-            continue
-        gpu = GpuScene(gl_context(), scene)
-        for view in case.cameras(scene, most):
-            if (case.scene, stage, mode, view.name) not in known:
-                dump = capture(Frame(gpu, view, *size)).dump
-                yield CapturedView(case.scene, stage, mode, view.name, dump)
+        yield from views_of_scene(case, scene, mode, size, most, known)
+
+
+def views_of_scene(
+    case: Case,
+    scene: SceneArrays,
+    mode: str,
+    size: tuple[int, int],
+    most: int | None,
+    known: frozenset[tuple[str, str, str, str]] = frozenset(),
+) -> Iterator[CapturedView]:
+    """The views of a stage that is loaded, one at a time.
+
+    Args:
+        case: The stage.
+        scene: As loaded.
+        mode: What the views are said to be of.
+        size: Pixels per row, rows.
+        most: As of `captured_views`.
+        known: As of `captured_views`.
+    """
+    stage = stage_of(case)
+    if scene.is_opaque:
+        yield CapturedView(case.scene, stage, mode, "", None, "nothing in it is transparent")
+        return
+    gpu = GpuScene(gl_context(), scene)
+    for view in case.cameras(scene, most):
+        if (case.scene, stage, mode, view.name) not in known:
+            dump = capture(Frame(gpu, view, *size)).dump
+            yield CapturedView(case.scene, stage, mode, view.name, dump)
+
+
+def stage_of(case: Case) -> str:
+    """The stage's file, relative to the scene's folder."""
+    return str(case.path).rpartition(f"/{case.scene}/")[2]

@@ -133,7 +133,6 @@ def _measurement(number: int) -> Measurement:
         mse_occupied=2.0 * error,
         psnr=40.0,
         flip=0.01,
-        k_min=1,
         k_max=40,
         captured_fragments=1_000_000,
         total_fragments=5_000_000,

@@ -1,20 +1,18 @@
-"""Labels of a view under a tail: its error curves, its training rows, and what rules without a network do to it."""
+"""Labels of a view under a tail: its curves of whole bins, its training rows, and what other rules do to it."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.predicting.augmentation import Remap, remapped
-from benchmarks.predicting.cost import Cost, memory_of, rule_cost
 from benchmarks.predicting.store import Store, key_of
 from benchmarks.predicting.views import ViewRow, load_dump
 from labeller.allocation import RuleName
-from labeller.curves import Curves, error_curves
+from labeller.curves import Curves, error_curves, whole_bins
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
 from labeller.shards import write_shard
@@ -25,14 +23,11 @@ ORACLE_TAIL: Final[TailName] = "weighted-average"
 ORACLE_RULE: Final[RuleName] = "greedy"
 """DHOIT's optimal k-buffer: Algorithm 1, offline, with its own tail."""
 
-OFFLINE: Final[tuple[RuleName, ...]] = ("optimal", "greedy")
-"""Rules that know the error of everything."""
+OPTIMUM: Final = "optimal, whole bins"
+"""The certified optimum of what a predictor can choose."""
 
-RUN_TIME: Final[tuple[RuleName, ...]] = ("proportional", "importance", "dynamic", "fixed")
-"""Rules that a frame can follow."""
-
-_LABELLED: Final = 1
-"""k_min of the curves."""
+RIVALS: Final[tuple[RuleName, ...]] = ("importance", "dynamic", "fixed")
+"""VKB, the k+-buffer and fixed k: what a frame can follow without a network, any k."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,9 +37,9 @@ class Labelled:
     Attributes:
         key: Of what decided them.
         tail: The tail.
-        mse: Rule -> mean squared error per channel at each of the view's budgets.
+        mse: `OPTIMUM` or rule -> mean squared error per channel at each of the view's budgets.
         shard: Training rows.
-        errors: float32 [N + P] on disk, `labeller.curves.Curves.error`.
+        errors: float32 [N + P] on disk, `labeller.curves.Curves.error` of whole bins.
     """
 
     key: str
@@ -54,69 +49,47 @@ class Labelled:
     errors: Path
 
     def curves(self, dump: FragmentDump) -> Curves:
-        """The error curves; read from disk when they are used."""
+        """The error curves of whole bins; read from disk when they are used."""
         error: NDArray[np.float32] = np.load(self.errors, mmap_mode="r")
         return Curves(dump.offsets + np.arange(dump.pixels + 1), error, self.tail, DENSITY_G, "display")
 
 
-def labels_of(store: Store, row: ViewRow, tail: TailName, remap: Remap | None = None) -> Labelled:
+def labels_of(store: Store, row: ViewRow, tail: TailName) -> Labelled:
     """The labels of a view, made where they are not there.
 
     Args:
         store: Where they are kept.
         row: The view.
-        tail: The tail.
-        remap: What is changed in it; None: nothing. Such a view is trained on and never scored.
+        tail: A tail with bins.
     """
-    key = key_of(row.digest, tail, remap, store.code("labels"))
+    key = key_of(row.digest, tail, row.multiples, store.code("labels"))
     shard, errors = (store.path("labels", f"{key}.{suffix}") for suffix in ("safetensors", "npy"))
-    found = store.remember("labels", key, lambda: _label(store, row, tail, remap, shard, errors))
+    found = store.remember("labels", key, lambda: _label(store, row, tail, shard, errors))
     return Labelled(key, tail, found["mse"], shard, errors)
 
 
 def oracle_of(store: Store, row: ViewRow) -> list[float]:
     """Mean squared errors that scores are relative to, one for each of the view's budgets."""
-    return labels_of(store, row, ORACLE_TAIL).mse[ORACLE_RULE]
+    key = key_of(row.digest, ORACLE_TAIL, row.multiples, store.code("labels"))
 
+    def make() -> list[float]:
+        dump = load_dump(store, row)
+        return _errors(dump, error_curves(dump, ORACLE_TAIL), row.budgets, ORACLE_RULE)
 
-def at_memory(store: Store, row: ViewRow, tail: TailName) -> dict[str, list[float | None]]:
-    """Mean squared errors of the rules of a frame at equal total memory, for each of the view's budgets.
-
-    Returns:
-        Rule of `RUN_TIME` -> errors; None where it does not fit.
-    """
-    labels = labels_of(store, row, tail)
-    costs = {rule: rule_cost(tail, nearest=rule == "importance") for rule in RUN_TIME}
-    key = key_of(labels.key, {rule: asdict(cost) for rule, cost in costs.items()})
-    found: dict[str, list[float | None]] = store.remember("memory", key, lambda: _at_memory(store, row, labels, costs))
+    found: list[float] = store.remember("oracle", key, make)
     return found
 
 
-def _at_memory(
-    store: Store, row: ViewRow, labels: Labelled, costs: dict[RuleName, Cost]
-) -> dict[str, list[float | None]]:
+def _label(store: Store, row: ViewRow, tail: TailName, shard: Path, errors: Path) -> dict[str, Any]:
     dump = load_dump(store, row)
-    curves, found = labels.curves(dump), {}
-    for rule, cost in costs.items():
-        budgets = [cost.budget(memory_of(m, row.pixels), row.pixels) for m in row.multiples]
-        made = iter(_errors(dump, curves, [budget for budget in budgets if budget is not None], rule))
-        found[str(rule)] = [None if budget is None else next(made) for budget in budgets]
-    return found
-
-
-def _label(
-    store: Store, row: ViewRow, tail: TailName, remap: Remap | None, shard: Path, errors: Path
-) -> dict[str, Any]:
-    dump = load_dump(store, row)
-    if remap is not None:
-        dump = remapped(dump, remap)
     curves = error_curves(dump, tail)
-    hulls = lower_hulls(curves, _LABELLED)
-    write_shard(shard, dump, curves, hulls, row.budgets)
-    if remap is not None:
+    cuts = whole_bins(dump, curves)
+    write_shard(shard, dump, cuts, lower_hulls(cuts), row.budgets)
+    if not row.is_scored:
         return {"mse": {}}
-    store.write(errors, lambda path: np.save(path, curves.error))
-    return {"mse": {rule: _errors(dump, curves, row.budgets, rule) for rule in (*OFFLINE, *RUN_TIME)}}
+    store.write(errors, lambda path: np.save(path, cuts.error))
+    rivals = {str(rule): _errors(dump, curves, row.budgets, rule) for rule in RIVALS}
+    return {"mse": {OPTIMUM: _errors(dump, cuts, row.budgets, "optimal"), **rivals}}
 
 
 def _errors(dump: FragmentDump, curves: Curves, budgets: list[int], rule: RuleName) -> list[float]:

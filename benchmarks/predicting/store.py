@@ -27,28 +27,22 @@ _LABELLER: Final = tuple(
 )
 
 CODE: Final = {
+    "dumps": ("renderer.opacities", *_here("views")),
     "labels": (
         *_LABELLER,
         *(f"labeller.{name}" for name in ("columns", "sampling", "shard_file", "shards")),
-        *(f"renderer.{name}" for name in ("features", "depth_bins")),
+        *(f"renderer.{name}" for name in ("features", "depth_bins", "tile_range")),
         *(f"renderer.allocation.{name}" for name in ("dynamic", "fill", "importance")),
         *("schemas.tail", "schemas.colour"),
-        *_here("labels", "augmentation"),
+        *_here("labels"),
     ),
     # Settings of a training are in its key themselves.
     "training": (
         *(f"trainer.{name}" for name in ("adam", "dataset", "evaluate", "heads", "loss", "models")),
-        *(f"trainer.{name}" for name in ("paper", "segments", "sgd", "train", "views", "weights")),
-        *_here("training", "inputs", "augmentation", "distilled"),
+        *(f"trainer.{name}" for name in ("segments", "sgd", "train", "views", "weights")),
+        *_here("training"),
     ),
-    "scores": (
-        *("trainer.weights", "trainer.paper", "renderer.allocation.fill"),
-        *_here("scoring", "feedback", "inputs", "cost"),
-    ),
-    "tails": (*_LABELLER, "schemas.tail", *_here("tails", "tail_kernels")),
-    "learned": ("renderer.depth_bins", *_here("learned_tail", "learned_scores", "tail_kernels")),
-    "weighted": ("labeller.flip_weights", "renderer.reference.flip", "schemas.colour", *_here("weighted")),
-    "factors": ("schemas.tail", *_here("factors", "factor_scores", "tail_kernels")),
+    "scores": ("trainer.weights", "renderer.allocation.cuts", "renderer.features", *_here("cuts", "scoring")),
 }
 """Sources that decide a kind of result: one of them changed, it is worked out again."""
 

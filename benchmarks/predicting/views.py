@@ -6,27 +6,35 @@ import hashlib
 import re
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from benchmarks.casting.cases import Case, described_cases, sample_cases
-from benchmarks.labelling.views import captured_views
+from benchmarks.labelling.views import CapturedView, captured_views, views_of_scene
 from benchmarks.predicting.store import Store, key_of
+from renderer.opacities import BASE_ALPHA, drawn_opacities
+from renderer.scene import LoadOptions, load_scene
 from schemas.fragments import FragmentDump
 from schemas.problem import Problem
 
-MULTIPLES: Final = (1, 2, 4)
-"""Budgets that are scored: F = W H times this, where F < N."""
+MULTIPLES: Final = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
+"""Budgets that are scored: F = W H times this, where F < `MOST_SHARE` N."""
+MOST_SHARE: Final = 0.95
+"""Beyond so much of N next to nothing is left to decide."""
+
+MATERIALS: Final = "materials"
+"""Mode of the views that are trained on and never scored: every material has an opacity drawn at random."""
 
 STAGES: Final = 3
 """Most stages of a scene: some have many small ones, and every asset weighs the same anyway."""
 
-_ARRAYS: Final = ("offsets", "rgba", "depth", "background", "facing")
+_ARRAYS: Final = ("offsets", "rgba", "depth", "background", "facing", "tile_range")
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +45,10 @@ class ViewRow:
         name: Of its files.
         asset: The scene that it shows; held out as a whole.
         stage: File of the stage.
-        mode: Opacity: one for all surfaces, or each its own.
+        mode: Opacity: one for all surfaces, each its own, or `MATERIALS`.
         view: The camera's name.
         pixels: W H.
-        fragments: N, above W H.
+        fragments: N, enough for one of the budgets.
         occupied: Pixels with at least one fragment.
         digest: Of its fragments.
     """
@@ -56,33 +64,44 @@ class ViewRow:
     digest: str
 
     @property
-    def multiples(self) -> list[int]:
-        """Of W H, the budgets below N."""
-        return [m for m in MULTIPLES if m * self.pixels < self.fragments]
+    def is_scored(self) -> bool:
+        """Whether it is scored, and not trained on alone."""
+        return self.mode != MATERIALS
+
+    @property
+    def multiples(self) -> list[float]:
+        """Of W H, the budgets that leave something to decide."""
+        return multiples_of(self.pixels, self.fragments)
 
     @property
     def budgets(self) -> list[int]:
         """F of each."""
-        return [m * self.pixels for m in self.multiples]
+        return [int(m * self.pixels) for m in self.multiples]
 
 
-def views_of(store: Store, scenes: Path | None, size: tuple[int, int], most: int) -> list[ViewRow]:
-    """Every view with more fragments than pixels. What was captured before is not captured again.
+def multiples_of(pixels: int, fragments: int) -> list[float]:
+    """The budgets that views of so many pixels and fragments are scored at, of W H."""
+    return [m for m in MULTIPLES if m * pixels < MOST_SHARE * fragments]
 
-    Stages are told apart by name, size and views alone: after a change of the renderer delete the folder `dumps`.
+
+def views_of(store: Store, folders: Sequence[Path], size: tuple[int, int], most: int) -> list[ViewRow]:
+    """Every view that has a budget. What was captured before is not captured again.
+
+    Stages are told apart by name, size and views alone: after another change of the renderer delete the folder `dumps`.
 
     Args:
         store: Where they are kept.
-        scenes: Folder with MANIFEST.json; None: the project's own scenes only.
+        folders: Each with scenes and MANIFEST.json, beside the project's own scenes.
         size: Pixels per row, rows.
         most: Views of a stage, in each mode.
     """
     seen: Counter[str] = Counter()
     rows: list[ViewRow] = []
-    for case in sample_cases(store.folder / "samples") + (described_cases(scenes) if scenes is not None else []):
+    described = chain.from_iterable(map(described_cases, folders))
+    for case in chain(sample_cases(store.folder / "samples"), described):
         seen[case.scene] += 1
         if seen[case.scene] <= STAGES:
-            key = key_of(case.scene, case.path.name, case.variants, size, most)
+            key = key_of(case.scene, case.path.name, case.variants, size, most, store.code("dumps"))
             found = store.remember("dumps", key, partial(_captured, store, case, key, size, most))
             rows += [ViewRow(**row) for row in found]
     return rows
@@ -111,9 +130,9 @@ def _captured(store: Store, case: Case, key: str, size: tuple[int, int], most: i
 
 def _rows(store: Store, case: Case, key: str, size: tuple[int, int], most: int) -> Iterator[ViewRow]:
     try:
-        for view in captured_views(case, size, most):
+        for view in chain(captured_views(case, size, most), _of_materials(case, size, most)):
             dump = view.dump
-            if dump is None or dump.total <= dump.pixels:
+            if dump is None or not multiples_of(dump.pixels, dump.total):
                 continue
             name = re.sub(r"[^\w.-]+", "", f"{case.scene}-{case.path.stem}-{view.mode}-{view.view}-{key[:6]}")
             arrays = {array: getattr(dump, array) for array in _ARRAYS}
@@ -124,3 +143,10 @@ def _rows(store: Store, case: Case, key: str, size: tuple[int, int], most: int) 
             yield ViewRow(name, *about, dump.pixels, dump.total, occupied, digest_of(dump))
     except Problem as problem:
         print(f"{case.scene} {case.path.name}: {problem.title}", file=sys.stderr, flush=True)
+
+
+def _of_materials(case: Case, size: tuple[int, int], most: int) -> Iterator[CapturedView]:
+    """The views of a stage whose materials have drawn opacities: always the same for the same stage."""
+    seed = int(key_of(case.scene, case.path.name)[:8], 16)
+    scene = drawn_opacities(load_scene(case.path, LoadOptions(alpha=BASE_ALPHA, variants=case.variants)), seed)
+    yield from views_of_scene(case, scene, MATERIALS, size, most)

@@ -13,6 +13,7 @@ import numpy as np
 from renderer.context import describe
 from renderer.features import FEATURES
 from schemas.bundle import Provenance, TailSpec
+from schemas.tail import DEFAULT_TAIL, DENSITY_G
 from services.stress.predictors import random_layers
 from trainer.bundle import Description, export_bundle
 from trainer.weights import Weights
@@ -30,9 +31,8 @@ def random_bundle(ctx: moderngl.Context) -> Iterator[Path]:
     weights = Weights(FEATURES, mean, std, layers)
     description = Description(
         name="random",
-        tail=TailSpec(name="density", g=0.75),
+        tail=TailSpec(name=DEFAULT_TAIL, g=DENSITY_G),
         metric="display",
-        k_min=1,
         provenance=Provenance(scenes={}, code_version="0", seed=3, machine=describe(ctx)),
         evaluation={},
     )

@@ -15,6 +15,7 @@ from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.hidden import hidden_fragments
 from renderer.techniques import Budget, KBufferDeep, KBufferImportance, Technique
+from schemas.bundle import load_manifest
 
 SIZE = (1430, 960)
 FACTOR = 2
@@ -73,7 +74,8 @@ def _captures(frame: Frame) -> Callable[[], object]:
 
 def learned_cost(subject: Subject, bundle: Path, rounds: int) -> dict[str, Any]:
     """What `kbuffer-deep` costs beyond `kbuffer-importance`, with the network in GLSL and in onnxruntime."""
-    budget = Budget(FACTOR * SIZE[0] * SIZE[1])
+    tail = load_manifest(bundle).tail
+    budget = Budget(FACTOR * SIZE[0] * SIZE[1], tail.name, tail.g)
     made: dict[str, Technique] = {
         "importance": KBufferImportance(),
         "deep, GLSL": KBufferDeep(bundle, "glsl"),

@@ -1,15 +1,10 @@
-"""Slots of every pixel from predicted curves, by compute passes: nothing is read back within a frame.
+"""Whole bins of every pixel from predicted curves, by compute passes: nothing is read back within a frame.
 
-`renderer.allocation.lattice` is the same in numpy, and says why it is exact. In order:
+`renderer.allocation.cuts` is the same in numpy, and says why it is exact. In order:
 
-- `select`: totals of n in blocks, k_min, and whether all fits;
-- a predictor fills in the curves of the pixels that have a choice: n > k_min, unless all fits;
-- `solve`: a list of these pixels, then rounds of counting at 64 prices, those that are not needed being empty
-  dispatches. The list is not there before: what the predictor reads is gone then, and the peak is lower by it;
-- `place`: slots at the found price, the remainder, and their exclusive prefix sum.
-
-Sums stop at 2^31 - 1: no budget is as large, and what stops there is the same in any order. A pixel takes part with at
-most `renderer.screen.TURNS` fragments, so that a block's sums stay far below.
+- `begin`: fragments that can be in a core, and whether the budget covers them;
+- a predictor fills in the curves of the occupied pixels, unless it does;
+- `place`: two counts of fragments by price select the price that uses the budget, then cuts and their prefix sum.
 """
 
 from __future__ import annotations
@@ -19,162 +14,116 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from renderer.allocation.lattice import EDGES, LAST, LEAST_RATE, MOST_FRAGMENTS, MOST_GAIN, MOST_RATE, ROUNDS, SHIFT
+from renderer.allocation.cuts import DROPPED_BITS, FULL, HALF_BITS, LEAST_FALL, MOST_CORE, MOST_FALL, MOST_GAIN
+from renderer.bin_pass import Binned
 from renderer.gpu_scene import run_for, set_uniforms
-from renderer.programs import Programs
+from renderer.programs import Defines, Programs
 
 BLOCK = 2048
 """Pixels of a work group."""
-CEILING = 2**31 - 1
-"""Where sums stop. A budget below it is met to the fragment; a pool of that many slots would be 17 GB."""
-LIST_BYTES = 4
-"""Bytes a pixel of the list that becomes the offsets; the blocks' sums are an eighth of a byte."""
 CURVE_BYTES = 8
 """Bytes a pixel of the curves."""
 
 STATE = np.dtype(
     [
-        *((name, "<u4") for name in ("k_min", "complete", "occupied", "open_pixels", "left", "low_sum")),
-        *((name, "<u4") for name in ("listed", "rounds", "warm")),
-        *((name, "<i4") for name in ("low", "high")),
-        ("count_groups", "<u4", 3),
-        ("edge", "<i4", EDGES),
+        *((name, "<u4") for name in ("budget", "complete", "occupied", "fragments", "high", "rank", "spent")),
+        ("counted", "<u4", 1 << HALF_BITS),
     ]
 )
 """`allocation/state.glsl`."""
-assert STATE.fields is not None, "it is a structure"
-_COUNT_GROUPS = int(STATE.fields["count_groups"][1])
-"""Byte of `count_groups` in it."""
 
-DEFINES = {"BLOCK": BLOCK, "EDGES": EDGES, "LAST": LAST, "SHIFT": SHIFT, "TURNS": MOST_FRAGMENTS}
-CURVE_DEFINES = {**DEFINES, "MOST_GAIN": MOST_GAIN, "LEAST_RATE": LEAST_RATE, "MOST_RATE": MOST_RATE}
-"""Of a shader that writes curves."""
+DEFINES: Defines = {
+    **{"BLOCK": BLOCK, "HALF_BITS": HALF_BITS, "DROPPED_BITS": DROPPED_BITS, "FULL": FULL, "MOST_CORE": MOST_CORE},
+    **{"MOST_GAIN": MOST_GAIN, "LEAST_FALL": LEAST_FALL, "MOST_FALL": MOST_FALL},
+}
+"""Of the shaders of an allocation, and of those that write curves, beside BINS."""
 
-_STATE, _COUNTS, _LIST, _CURVES, _BLOCKS = range(5)
+_STATE, _COUNTS, _CURVES, _BLOCKS, _OFFSETS = range(5)
 """Storage bindings of `allocation/*.comp`."""
 
 
 @dataclass(frozen=True, slots=True)
-class SolvedState:
+class AllocationState:
     """What the passes of a frame found.
 
     Attributes:
-        k_min: 1 where the budget covered every occupied pixel.
-        complete: Whether it covered every fragment, so that nothing was predicted or solved.
+        complete: Whether the budget covered all that can be in a core: nothing was predicted or selected.
         occupied: Pixels with fragments.
-        settled: Of them those that k_min settled.
-        rounds: Rounds that counted.
-        index: Of the price (`renderer.allocation.lattice.price`).
+        rank: Of the price that all pixels were granted (`renderer.allocation.cuts`), as `Cuts` has it.
     """
 
-    k_min: int
     complete: bool
     occupied: int
-    settled: int
-    rounds: int
-    index: int
-
-
-class GpuAllocation:
-    """Allocates one frame after the other; each search starts from the price of the last.
-
-    Args:
-        ctx: The context.
-    """
-
-    def __init__(self, ctx: moderngl.Context) -> None:
-        self._ctx = ctx
-        self._state = ctx.buffer(np.zeros(1, dtype=STATE))
-
-    def select(self, programs: Programs, counts: moderngl.Buffer, pixels: int, budget: int) -> FrameAllocation:
-        """Find what a frame has to solve.
-
-        Args:
-            programs: Of the context.
-            counts: uint32 [P], n.
-            pixels: P.
-            budget: F.
-        """
-        allocation = FrameAllocation(self._ctx, programs, self._state, counts, pixels)
-        allocation.select(budget)
-        return allocation
+    rank: int | None
 
 
 class FrameAllocation:
-    """The passes of one frame; made by `GpuAllocation.select`.
+    """The passes of one frame.
 
-    Attributes:
-        listed: uint32 [P+1]: the pixels that have a choice, in any order; `place` turns it into the offsets. Made by
-            `solve`.
+    Args:
+        ctx: The context.
+        programs: Of the context.
+        binned: The frame's bins, counted. Their counts become cuts and cursors.
+        pixels: P.
+        budget: F.
     """
 
-    def __init__(
-        self,
-        ctx: moderngl.Context,
-        programs: Programs,
-        state: moderngl.Buffer,
-        counts: moderngl.Buffer,
-        pixels: int,
-    ) -> None:
+    def __init__(self, ctx: moderngl.Context, programs: Programs, binned: Binned, pixels: int, budget: int) -> None:
+        assert binned.counts is not None, "bins are counted"
         self._ctx, self._programs, self._pixels = ctx, programs, pixels
-        self._groups = pixels // BLOCK + 1  # blocks of pixels + 1 offsets
-        self.listed: moderngl.Buffer | None = None
-        scratch = ctx.buffer(reserve=4 * EDGES * self._groups)
-        self._buffers = {_STATE: state, _COUNTS: counts, _BLOCKS: scratch}
+        self._defines = {**DEFINES, "BINS": binned.tail.bins}
+        self._blocks = -(-pixels // BLOCK)
+        state = np.zeros(1, dtype=STATE)
+        state["budget"] = min(budget, 2**32 - 1)
+        self._buffers = {
+            _STATE: ctx.buffer(state),
+            _COUNTS: binned.counts,
+            _BLOCKS: ctx.buffer(reserve=8 * self._blocks),
+        }
 
-    def select(self, budget: int) -> None:
-        """Totals, k_min, and whether all fits."""
-        self._run("totals", self._groups)
-        self._run("begin", 1, blocks=self._groups, budget=min(budget, CEILING - 1))
+    def begin(self) -> None:
+        """Find whether the budget covers all that can be in a core."""
+        self._run("totals", self._blocks)
+        self._run("choose", 1, STEP=0)
 
-    def run_pixels(self, program: moderngl.ComputeShader, state_binding: int) -> None:
-        """Run a shader on every pixel, as `run_for` does, with the state bound."""
-        self._buffers[_STATE].bind_to_storage_buffer(state_binding)
+    def run_pixels(self, program: moderngl.ComputeShader) -> None:
+        """Run a shader on every pixel, as `run_for` does, with state and counts bound where these passes have them."""
+        for binding in (_STATE, _COUNTS):
+            self._buffers[binding].bind_to_storage_buffer(binding)
+        set_uniforms(program, {"pixels": self._pixels})
         run_for(program, self._pixels)
         self._ctx.memory_barrier()
 
-    def solve(self, curves: moderngl.Buffer) -> None:
-        """Find the price of the listed pixels' curves; it stays in the state.
+    def place(self, curves: moderngl.Buffer) -> moderngl.Buffer:
+        """Select the price, and lay out the pool: counts become cuts and cursors.
 
         Args:
-            curves: float32 [P, 2], the a and rate of `renderer.allocation.lattice.Curves`, where n > k_min.
+            curves: float32 [P, 2], a and b of the occupied pixels.
+
+        Returns:
+            uint32 [P], where each pixel's run of the pool begins.
         """
-        self.listed = self._ctx.buffer(reserve=4 * (self._pixels + 1))
-        self._buffers |= {_CURVES: curves, _LIST: self.listed}
-        self._run("list", self._groups)
-        for _ in range(ROUNDS):
-            self._run("count", None)
-            self._run("choose", 1)
+        offsets = self._ctx.buffer(reserve=4 * self._pixels)
+        self._buffers |= {_CURVES: curves, _OFFSETS: offsets}
+        for low in (0, 1):
+            self._run("count", self._blocks, LOW=low)
+            self._run("choose", 1, STEP=1 + low)
+        self._run("blocks", self._blocks)
+        self._run("scan", 1)
+        self._run("place", self._blocks)
+        self._buffers.pop(_CURVES)  # nothing else reads them
+        return offsets
 
-    def forget_curves(self) -> None:
-        """Let go of the curves: the slots are placed, and nothing else reads them."""
-        self._buffers.pop(_CURVES, None)
-
-    def place(self) -> moderngl.Buffer:
-        """The offsets of every pixel's slots, uint32 [P+1]: slots at the price, and what is left by pixel index."""
-        self._run("blocks", self._groups)
-        self._run("scan", 1, blocks=self._groups)
-        self._run("offsets", self._groups)
-        assert self.listed is not None, "solve is before"
-        return self.listed
-
-    def read_state(self) -> SolvedState:
+    def read_state(self) -> AllocationState:
         """What was found, for statistics after a frame."""
         state = np.frombuffer(self._buffers[_STATE].read(), dtype=STATE)[0]
-        k_min, complete, occupied, open_pixels, rounds = (
-            int(state[name]) for name in ("k_min", "complete", "occupied", "open_pixels", "rounds")
-        )
-        settled = 0 if complete else occupied - open_pixels
-        return SolvedState(k_min, bool(complete), occupied, settled, rounds, int(state["low"]))
+        complete = bool(state["complete"])
+        return AllocationState(complete, int(state["occupied"]), None if complete else int(state["rank"]) - 1)
 
-    def _run(self, name: str, groups: int | None, **uniforms: int) -> None:
-        """Run a shader, on as many groups as the state says a round needs where the number is None."""
-        program = self._programs.compute(f"allocation/{name}.comp", DEFINES)
+    def _run(self, name: str, groups: int, **defines: int) -> None:
+        program = self._programs.compute(f"allocation/{name}.comp", {**self._defines, **defines})
         for binding, buffer in self._buffers.items():
             buffer.bind_to_storage_buffer(binding)
-        set_uniforms(program, {"pixels": self._pixels, **uniforms})
-        if groups is None:
-            program.run_indirect(self._buffers[_STATE], _COUNT_GROUPS)
-        else:
-            program.run(groups)
+        set_uniforms(program, {"pixels": self._pixels, "blocks": self._blocks})
+        program.run(groups)
         self._ctx.memory_barrier()

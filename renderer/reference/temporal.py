@@ -78,7 +78,7 @@ def corrected(
         a: float64 [P], log gain of the first fragment as predicted; finite.
         b: float64 [P], decay per fragment; finite, > 0.
         n: int [P], fragments.
-        is_open: bool [P], whether the pixel has a choice: `n > k_min`, and not all fits.
+        is_open: bool [P], whether the pixel has a choice: `n > 0`, and not all fits.
         still: Whether the camera has not moved.
 
     Returns:

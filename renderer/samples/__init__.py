@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from renderer.samples.built import engine, voxel_town
@@ -23,10 +23,18 @@ SAMPLES: dict[str, Callable[[Path], Path]] = {
     "jellyfish": jellyfish,
     "curtains": curtains,
 }
-"""Writers by name; each takes the folder and returns the stage's file."""
+"""Writers by name; each takes the folder and returns the stage's file. Deep scenes are in `renderer.samples.deep`."""
 
 
-def write_samples(folder: Path) -> list[Path]:
-    """Writes every sample scene, with its textures, into `folder` and returns the stages' files."""
+def write_samples(folder: Path, writers: Mapping[str, Callable[[Path], Path]] = SAMPLES) -> list[Path]:
+    """Write sample scenes with their textures.
+
+    Args:
+        folder: Where they go; created if missing.
+        writers: Which; by default the small ones.
+
+    Returns:
+        The stages' files.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    return [write(folder) for write in SAMPLES.values()]
+    return [write(folder) for write in writers.values()]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
-from renderer.samples.shapes import Floats, Polygons
+from renderer.samples.shapes import Floats, Polygons, sphere
 
 Colour = tuple[float, float, float]
 
@@ -63,21 +63,9 @@ class StageAuthor:
     def textured(self, name: str, asset: str, opacity_scale: float = 1.0, threshold: float = 0.0) -> UsdShade.Material:
         """A UsdPreviewSurface with colour and opacity from an image's RGB and alpha, read through `st`."""
         material, shader = self._surface(name)
-        root = material.GetPath()
-        reader = UsdShade.Shader.Define(self.stage, root.AppendChild("Coordinates"))
-        reader.CreateIdAttr("UsdPrimvarReader_float2")
-        reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
-        texture = UsdShade.Shader.Define(self.stage, root.AppendChild("Image"))
-        texture.CreateIdAttr("UsdUVTexture")
-        texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(asset)
-        texture.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")
-        texture.CreateInput("wrapS", Sdf.ValueTypeNames.Token).Set("clamp")
-        texture.CreateInput("wrapT", Sdf.ValueTypeNames.Token).Set("clamp")
+        texture = self._image_reader(material.GetPath(), asset)
         if opacity_scale != 1.0:
             texture.CreateInput("scale", Sdf.ValueTypeNames.Float4).Set(Gf.Vec4f(1, 1, 1, opacity_scale))
-        texture.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(
-            reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
-        )
         shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).ConnectToSource(
             texture.CreateOutput("rgb", Sdf.ValueTypeNames.Float3)
         )
@@ -87,6 +75,37 @@ class StageAuthor:
         if threshold > 0.0:
             shader.CreateInput("opacityThreshold", Sdf.ValueTypeNames.Float).Set(threshold)
         return material
+
+    def soft(self, name: str, asset: str) -> UsdShade.Material:
+        """A UsdPreviewSurface with the colour of the primvar displayColor and the opacity of an image's alpha."""
+        material, shader = self._surface(name)
+        root = material.GetPath()
+        colour = UsdShade.Shader.Define(self.stage, root.AppendChild("Colour"))
+        colour.CreateIdAttr("UsdPrimvarReader_float3")
+        colour.CreateInput("varname", Sdf.ValueTypeNames.String).Set("displayColor")
+        shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).ConnectToSource(
+            colour.CreateOutput("result", Sdf.ValueTypeNames.Float3)
+        )
+        shader.CreateInput("opacity", Sdf.ValueTypeNames.Float).ConnectToSource(
+            self._image_reader(root, asset).CreateOutput("a", Sdf.ValueTypeNames.Float)
+        )
+        return material
+
+    def _image_reader(self, root: Sdf.Path, asset: str) -> UsdShade.Shader:
+        """A clamped UsdUVTexture in a material, read through `st`."""
+        reader = UsdShade.Shader.Define(self.stage, root.AppendChild("Coordinates"))
+        reader.CreateIdAttr("UsdPrimvarReader_float2")
+        reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("st")
+        texture = UsdShade.Shader.Define(self.stage, root.AppendChild("Image"))
+        texture.CreateIdAttr("UsdUVTexture")
+        texture.CreateInput("file", Sdf.ValueTypeNames.Asset).Set(asset)
+        texture.CreateInput("sourceColorSpace", Sdf.ValueTypeNames.Token).Set("sRGB")
+        texture.CreateInput("wrapS", Sdf.ValueTypeNames.Token).Set("clamp")
+        texture.CreateInput("wrapT", Sdf.ValueTypeNames.Token).Set("clamp")
+        texture.CreateInput("st", Sdf.ValueTypeNames.Float2).ConnectToSource(
+            reader.CreateOutput("result", Sdf.ValueTypeNames.Float2)
+        )
+        return texture
 
     def _surface(self, name: str) -> tuple[UsdShade.Material, UsdShade.Shader]:
         material = UsdShade.Material.Define(self.stage, f"/World/Looks/{name}")
@@ -116,6 +135,95 @@ class StageAuthor:
         if material is not None:
             UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
         return mesh
+
+    def curves(
+        self, path: str, points: Floats, widths: Floats, colours: Floats, opacity: Floats
+    ) -> UsdGeom.BasisCurves:
+        """Cubic Bezier curves under /World, with display colours and opacities.
+
+        Args:
+            path: Under /World.
+            points: float64 [C, n, 3]; n = 4 + 3 i.
+            widths: Diameters, constant along the curve, float64 [C].
+            colours: Linear RGB of the curves, float64 [C, 3].
+            opacity: At both ends of every segment, alike for all curves, float64 [(n - 1) / 3 + 1].
+        """
+        count, each = points.shape[:2]
+        curves = UsdGeom.BasisCurves.Define(self.stage, f"/World/{path}")
+        curves.CreateTypeAttr(UsdGeom.Tokens.cubic)
+        curves.CreateBasisAttr(UsdGeom.Tokens.bezier)
+        curves.CreateWrapAttr(UsdGeom.Tokens.nonperiodic)
+        curves.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(count, each, np.int32)))
+        flat = np.ascontiguousarray(points.reshape(-1, 3), dtype=np.float32)
+        curves.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(flat))
+        curves.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack((flat.min(0), flat.max(0)))))
+        curves.CreateWidthsAttr(Vt.FloatArray.FromNumpy(widths.astype(np.float32)))
+        curves.SetWidthsInterpolation(UsdGeom.Tokens.uniform)
+        self.tint(curves, colours, np.tile(opacity, count), UsdGeom.Tokens.uniform, UsdGeom.Tokens.varying)
+        return curves
+
+    def points(self, path: str, points: Floats, widths: Floats, colours: Floats, opacity: Floats) -> UsdGeom.Points:
+        """Points under /World that are drawn as small balls.
+
+        Args:
+            path: Under /World.
+            points: float64 [P, 3].
+            widths: Diameters, float64 [P].
+            colours: Linear RGB, float64 [P, 3].
+            opacity: float64 [P].
+        """
+        cloud = UsdGeom.Points.Define(self.stage, f"/World/{path}")
+        places = np.ascontiguousarray(points, dtype=np.float32)
+        cloud.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(places))
+        cloud.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack((places.min(0), places.max(0)))))
+        cloud.CreateWidthsAttr(Vt.FloatArray.FromNumpy(widths.astype(np.float32)))
+        cloud.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
+        self.tint(cloud, colours, opacity, UsdGeom.Tokens.vertex, UsdGeom.Tokens.vertex)
+        return cloud
+
+    def tint(
+        self,
+        prim: UsdGeom.Gprim,
+        colours: Floats,
+        opacity: Floats | None,
+        of_colours: str,
+        of_opacity: str = UsdGeom.Tokens.constant,
+    ) -> None:
+        """Display colours, linear RGB float64 [n, 3], and opacities float64 [m], with their interpolations."""
+        prim.CreateDisplayColorPrimvar(of_colours).Set(Vt.Vec3fArray.FromNumpy(colours.astype(np.float32)))
+        if opacity is not None:
+            prim.CreateDisplayOpacityPrimvar(of_opacity).Set(Vt.FloatArray.FromNumpy(opacity.astype(np.float32)))
+
+    def sprites(self, path: str, cards: Polygons, normals: Floats, colours: Floats, look: UsdShade.Material) -> None:
+        """Flat cards of four points each, shaded as the volume that they stand for.
+
+        Args:
+            path: Under /World.
+            cards: See `shapes.sprites`.
+            normals: Of the volume at each card, float64 [M, 3]; all corners have it.
+            colours: Linear RGB of each card, float64 [M, 3].
+            look: From `soft`.
+        """
+        mesh = self.mesh(path, cards, look)
+        mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals.astype(np.float32)))
+        mesh.SetNormalsInterpolation(UsdGeom.Tokens.uniform)
+        self.tint(mesh, colours, None, UsdGeom.Tokens.uniform)
+
+    def sky(self, radius: float, colour: Colour, horizon: float = 0.0) -> None:
+        """An opaque sphere round a stage with y up, seen from inside.
+
+        Its normals are vertical: above the horizon it has one dim colour, as no light comes from there; below, it is
+        lit like a floor.
+
+        Args:
+            radius: In the stage's units.
+            colour: Linear RGB.
+            horizon: Height of its centre.
+        """
+        ball = sphere(radius, 12, 24).moved(by=(0.0, horizon, 0.0))
+        mesh = self.mesh("Sky", Polygons(ball.points, ball.faces, smooth=False), self.material("Sky", colour))
+        mesh.CreateNormalsAttr([Gf.Vec3f(0, 1, 0)])
+        mesh.SetNormalsInterpolation(UsdGeom.Tokens.constant)
 
     def place(
         self, path: str, at: tuple[float, float, float], *, turn: float = 0.0, scale: float = 1.0, kind: str = "Xform"

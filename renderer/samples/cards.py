@@ -11,20 +11,17 @@ from renderer.samples.images import leaf, puff, strands
 from renderer.samples.shapes import (
     Floats,
     Polygons,
+    bent_cards,
     disc,
     grid_faces,
     grid_st,
     joined,
     lathe,
     rounded,
-    sheet,
     sphere,
     tube,
+    unit,
 )
-
-
-def _unit(v: Floats) -> Floats:
-    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
 
 
 def _lock(
@@ -32,7 +29,7 @@ def _lock(
 ) -> Polygons:
     """A strip that grows from a root outwards, bends down and curls."""
     t = np.linspace(0.0, 1.0, steps)[:, None]
-    side = _unit(np.cross(out, np.array([0.0, 1.0, 0.0])) + 1e-6)
+    side = unit(np.cross(out, np.array([0.0, 1.0, 0.0])) + 1e-6)
     wave = curl * t * (np.sin(7.0 * t + phase) * side + 0.5 * np.cos(6.0 * t + phase) * out)
     path = (
         root + out * length * 0.45 * np.sqrt(t) * (1.0 - 0.35 * t) - np.array([0.0, 1.0, 0.0]) * length * t**1.6 + wave
@@ -44,10 +41,8 @@ def _lock(
     return Polygons(points, grid_faces(steps, 2), st)
 
 
-def hair_cards(folder: Path) -> Path:
-    """A head with a thousand locks of hair, each a strip with strands in its opacity texture."""
-    author = StageAuthor(folder / "hair_cards.usdc")
-    rng = np.random.default_rng(3)
+def bust(author: StageAuthor) -> None:
+    """An opaque head with neck and shoulders, looking along +z; the scalp is an ellipsoid round the origin."""
     skin = author.material("Skin", (0.68, 0.42, 0.30))
     author.mesh("Bust/Head", sphere(0.1, 32, 48).moved(scale=(0.92, 1.22, 1.0)), skin)
     neck = rounded([(0.05, -0.26), (0.045, -0.16), (0.05, -0.06)])
@@ -55,12 +50,19 @@ def hair_cards(folder: Path) -> Path:
     shoulders = rounded([(0.0, -0.36), (0.19, -0.36), (0.17, -0.29), (0.07, -0.24), (0.05, -0.22)])
     cloth = author.material("Cloth", (0.08, 0.12, 0.25))
     author.mesh("Bust/Shoulders", lathe(shoulders, 48).moved(scale=(1.0, 1.0, 0.6)), cloth)
+
+
+def hair_cards(folder: Path) -> Path:
+    """A head with a thousand locks of hair, each a strip with strands in its opacity texture."""
+    author = StageAuthor(folder / "hair_cards.usdc")
+    rng = np.random.default_rng(3)
+    bust(author)
     shades = ((0.36, 0.20, 0.09), (0.62, 0.38, 0.16), (0.24, 0.12, 0.07))
     for layer, shade in enumerate(shades):
         material = author.textured(f"Hair{layer}", author.image(f"hair{layer}.png", strands(shade, layer)))
         locks: list[Polygons] = []
         while len(locks) < 330:
-            out = _unit(rng.normal(size=3))
+            out = unit(rng.normal(size=3))
             # No hair on the face, which looks along +z.
             if out[1] < -0.15 or (out[2] > 0.45 and out[1] < 0.55):
                 continue
@@ -73,21 +75,6 @@ def hair_cards(folder: Path) -> Path:
     author.camera("Side", (0.8, 0.05, 0.15), (0.0, -0.07, 0.0), 38.0)
     author.camera("Front", (0.2, 0.1, 0.8), (0.0, -0.06, 0.0), 38.0)
     return author.save()
-
-
-def _cards(centres: Floats, normals: Floats, ups: Floats, sizes: Floats, aspect: float, bend: float) -> Polygons:
-    """Bent cards of 3 x 3 points each, standing on their centres."""
-    base = sheet(aspect, 1.0, 2, 2)
-    right = _unit(np.cross(ups, normals))
-    up = np.cross(normals, right)
-    local = base.points + np.array([0.0, 0.5, 0.0])
-    local[:, 2] = bend * (0.25 - local[:, 1] ** 2)
-    frame = np.stack((right, up, normals), axis=1) * sizes[:, None, None]
-    points = centres[:, None] + local[None] @ frame
-    count = len(centres)
-    faces = (base.faces[None] + 9 * np.arange(count)[:, None, None]).reshape(-1, 4)
-    assert base.st is not None
-    return Polygons(points.reshape(-1, 3), faces, np.tile(base.st, (count, 1)))
 
 
 def foliage(folder: Path) -> Path:
@@ -107,7 +94,7 @@ def foliage(folder: Path) -> Path:
         branches, tips = [], []
         for _ in range(26):
             start = trunk[int(rng.integers(5, 14))]
-            out = _unit(rng.normal(size=3) + np.array([0.0, 0.5, 0.0]))
+            out = unit(rng.normal(size=3) + np.array([0.0, 0.5, 0.0]))
             u = np.linspace(0.0, 1.0, 7)[:, None]
             line = start + out * float(rng.uniform(0.4, 0.85)) * u - np.array([0.0, 0.12, 0.0]) * u**2
             branches.append(tube(line, 0.022 * (1.1 - u[:, 0]), 6))
@@ -115,15 +102,15 @@ def foliage(folder: Path) -> Path:
         author.mesh(f"Tree{tree}/Branches", joined(branches), bark)
         picture = author.image(f"leaf{tree}.png", leaf(greens[tree], (0.6, 0.7, 0.5)[tree], tree))
         roots = np.concatenate(tips)[rng.integers(0, 26 * 5, 1500)]
-        facing = _unit(rng.normal(size=(1500, 3)))
-        hang = _unit(rng.normal(size=(1500, 3)) * 0.8 + np.array([0.0, -0.5, 0.0]))
+        facing = unit(rng.normal(size=(1500, 3)))
+        hang = unit(rng.normal(size=(1500, 3)) * 0.8 + np.array([0.0, -0.5, 0.0]))
         roots = roots + rng.normal(scale=0.06, size=(1500, 3))
-        leaves = _cards(roots, facing, hang, rng.uniform(0.11, 0.2, 1500), 0.75, 0.5)
+        leaves = bent_cards(roots, facing, hang, rng.uniform(0.11, 0.2, 1500), 0.75, 0.5)
         author.mesh(f"Tree{tree}/Leaves", leaves, author.textured(f"Leaf{tree}", picture))
     angle, reach = rng.uniform(0, 2 * np.pi, 1800), 3.3 * np.sqrt(rng.uniform(0, 1, 1800))
     place = np.column_stack((reach * np.cos(angle), np.zeros(1800), reach * np.sin(angle)))
-    facing = _unit(rng.normal(size=(1800, 3)) * np.array([1.0, 0.15, 1.0]))
-    grass = _cards(place, facing, np.tile([[0.0, 1.0, 0.0]], (1800, 1)), rng.uniform(0.12, 0.3, 1800), 0.3, 0.6)
+    facing = unit(rng.normal(size=(1800, 3)) * np.array([1.0, 0.15, 1.0]))
+    grass = bent_cards(place, facing, np.tile([[0.0, 1.0, 0.0]], (1800, 1)), rng.uniform(0.12, 0.3, 1800), 0.3, 0.6)
     blade = author.textured("Grass", author.image("grass.png", leaf((0.35, 0.55, 0.12), 1.0, 9)), threshold=0.4)
     author.mesh("Grass", grass, blade)
     author.camera("Front", (0.6, 1.5, 5.0), (0.0, 1.05, 0.0), 40.0)
@@ -177,9 +164,9 @@ def smoke_cards(folder: Path) -> Path:
                 wide * np.sin(swirl) * rng.uniform(0, 0.8, count),
             )
         )
-        facing = _unit(rng.normal(size=(count, 3)) * np.array([1.0, 0.3, 1.0]))
+        facing = unit(rng.normal(size=(count, 3)) * np.array([1.0, 0.3, 1.0]))
         size = rng.uniform(0.3, 0.5, count) * (0.6 + 1.1 * rise)
-        puffs = _cards(centre, facing, _unit(rng.normal(size=(count, 3))), size, 1.0, 0.1)
+        puffs = bent_cards(centre, facing, unit(rng.normal(size=(count, 3))), size, 1.0, 0.1)
         author.mesh(
             f"Smoke/Kind{kind}",
             puffs,

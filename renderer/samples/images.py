@@ -77,3 +77,10 @@ def lace(colour: tuple[float, float, float]) -> Floats:
     alpha = 0.14 + 0.14 * weave + 0.45 * dots
     rgb = np.array(colour) * (0.85 + 0.15 * dots)[..., None]
     return np.concatenate((np.clip(rgb, 0, 1), alpha[..., None]), axis=2)
+
+
+def glow(alpha: float) -> Floats:
+    """A white spot whose opacity falls off from `alpha` in the middle to nothing at the rim."""
+    t, s = _canvas((64, 64))
+    fall = np.clip(1.0 - 2.0 * np.hypot(t - 0.5, s - 0.5), 0.0, 1.0)
+    return np.concatenate((np.ones((64, 64, 3)), (alpha * fall**1.6)[..., None]), axis=2)

@@ -143,6 +143,49 @@ def sheet(width: float, height: float, rows: int = 1, columns: int = 1) -> Polyg
     return Polygons(points, grid_faces(rows + 1, columns + 1), st)
 
 
+def unit(vectors: Floats) -> Floats:
+    """Vectors [..., 3] scaled to unit length."""
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+
+
+def directions(count: int, rng: np.random.Generator) -> Floats:
+    """Unit vectors, uniform over the sphere, float64 [count, 3]."""
+    return unit(rng.normal(size=(count, 3)))
+
+
+def bent_cards(centres: Floats, normals: Floats, ups: Floats, sizes: Floats, aspect: float, bend: float) -> Polygons:
+    """Bent cards of 3 x 3 points each, standing on their centres."""
+    base = sheet(aspect, 1.0, 2, 2)
+    right = unit(np.cross(ups, normals))
+    up = np.cross(normals, right)
+    local = base.points + np.array([0.0, 0.5, 0.0])
+    local[:, 2] = bend * (0.25 - local[:, 1] ** 2)
+    frame = np.stack((right, up, normals), axis=1) * sizes[:, None, None]
+    points = centres[:, None] + local[None] @ frame
+    count = len(centres)
+    faces = (base.faces[None] + 9 * np.arange(count)[:, None, None]).reshape(-1, 4)
+    assert base.st is not None
+    return Polygons(points.reshape(-1, 3), faces, np.tile(base.st, (count, 1)))
+
+
+def sprites(centres: Floats, facing: Floats, sizes: Floats, rng: np.random.Generator) -> Polygons:
+    """Square cards of four points each round their centres, at random turns about what they face.
+
+    Args:
+        centres: float64 [M, 3].
+        facing: Unit normals, float64 [M, 3].
+        sizes: Sides, float64 [M].
+        rng: For the turns.
+    """
+    count = len(centres)
+    right = unit(np.cross(facing, directions(count, rng)))
+    across = 0.5 * sizes[:, None, None] * np.stack((right, np.cross(facing, right)), axis=1)
+    corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    points = centres[:, None] + corners[None] @ across
+    st = np.tile(0.5 * corners + 0.5, (count, 1))
+    return Polygons(points.reshape(-1, 3), np.arange(4 * count).reshape(-1, 4), st, smooth=False)
+
+
 def disc(radius: float, thickness: float, around: int = 64) -> Polygons:
     """A flat disc whose top is at height 0."""
     return lathe(

@@ -4,6 +4,7 @@ from renderer.techniques.abuffer_array import ABufferArray
 from renderer.techniques.abuffer_list import ABufferList
 from renderer.techniques.adaptive import Adaptive
 from renderer.techniques.base import Budget, Rendered, Technique
+from renderer.techniques.binned import Binned
 from renderer.techniques.depth_peeling import DepthPeeling
 from renderer.techniques.dual_depth_peeling import DualDepthPeeling
 from renderer.techniques.kbuffer import KBuffer
@@ -25,6 +26,7 @@ __all__ = [
     "ABufferArray",
     "ABufferList",
     "Adaptive",
+    "Binned",
     "Budget",
     "DepthPeeling",
     "DualDepthPeeling",

@@ -8,17 +8,30 @@ Memory is `8 max(n) P` bytes whatever most pixels need: what the S-buffer and th
 
 from __future__ import annotations
 
+from typing import Any
+
 import moderngl
 
 from renderer.frame import Clock, Frame
 from renderer.screen import TURNS, read_linear
-from renderer.techniques.bands import equal_rows, in_bands, listed, over_pixels
+from renderer.techniques.bands import (
+    Part,
+    check_most,
+    count_pixels,
+    count_totals,
+    equal_parts,
+    in_bands,
+    over_pixels,
+    read_counts,
+)
 from renderer.techniques.base import Budget, Rendered
 from renderer.techniques.chain import SLOT_BYTES
 from renderer.techniques.skips import frame_skips
 
 # Storage bindings of abuffer-array/*.
-_USED, _SLOTS, _PIXELS = range(3)
+_USED, _SLOTS = range(2)
+_PIXEL_BYTES = 4
+"""n: the cursor of the array, once the fullest pixel is known."""
 
 
 class ABufferArray:
@@ -36,52 +49,53 @@ class ABufferArray:
             Problem: One row of the window alone does not fit a storage buffer, or one pixel has more fragments than a
                 shader can go through.
         """
-        n = frame.count()
-        slots = int(n.max())
         clock = Clock(frame.ctx)
+        counted = count_pixels(frame, clock)
+        total, slots = count_totals(frame, clock, counted.counts)
+        check_most(slots)
+        counted.counts.clear()  # from now on the cursors, which end as the counts
 
-        def store(first: int, rows: int) -> list[moderngl.Buffer]:
+        def store(part: Part) -> list[moderngl.Buffer]:
             with clock.measure("array"):
-                buffers = _arrays(frame, first, rows, slots)
+                buffers = _arrays(frame, part, slots, counted.counts)
             with clock.measure("sort"):
-                _sort(frame, first, rows, slots)
+                _sort(frame, part, slots)
             return buffers
 
-        ends = equal_rows(frame, slots)
-        image = in_bands(frame, clock, ends, SLOT_BYTES, store, "abuffer-array/resolve.frag", slots=slots)
+        parts = equal_parts(frame, slots, SLOT_BYTES)
+        image = in_bands(frame, clock, counted.tiles, parts, store, "abuffer-array/resolve.frag", slots=slots)
+        linear = read_linear(frame, image)
         return Rendered(
-            linear=read_linear(frame, image),
-            k=n.astype("i4"),
-            passes={**frame.passes("opaque", "count"), **clock.passes},
-            captured=int(n.sum(dtype="i8")),
+            linear=linear,
+            k=read_counts(frame, counted.counts),
+            passes={**frame.passes("opaque"), **clock.passes},
+            captured=total,
             pool_bytes=SLOT_BYTES * slots * frame.pixels,
-            pixel_bytes=12 + 4 + 4,
-            skips=frame_skips(frame),
+            pixel_bytes=_PIXEL_BYTES,
+            skips=frame_skips(frame, counted.tiles),
         )
 
 
-def _arrays(frame: Frame, first: int, rows: int, slots: int) -> list[moderngl.Buffer]:
+def _arrays(frame: Frame, part: Part, slots: int, used: moderngl.Buffer) -> list[moderngl.Buffer]:
     """The arrays of some rows, bound; fragments in the order of arrival."""
-    used = frame.buffer(rows * frame.width, 0)
-    pool = frame.ctx.buffer(reserve=SLOT_BYTES * max(1, rows * frame.width * slots))
+    pool = frame.ctx.buffer(reserve=SLOT_BYTES * max(1, part.items))
     used.bind_to_storage_buffer(_USED)
     pool.bind_to_storage_buffer(_SLOTS)
-    target = frame.target([])
-    frame.draw_transparent("abuffer-array/append.frag", target, scissor=(first, rows), first_row=first, slots=slots)
+    target, rows = frame.target([]), (part.first, part.rows)
+    shader = "abuffer-array/append.frag"
+    frame.draw_transparent(shader, target, scissor=rows, first_row=part.first, slots=slots)
     frame.ctx.memory_barrier()
-    return [used, pool]
+    return [pool]
 
 
-def _sort(frame: Frame, first: int, rows: int, slots: int) -> None:
+def _sort(frame: Frame, part: Part, slots: int) -> None:
     """Sort the bound arrays: a dispatch that makes heaps, then as many as it takes to empty them."""
-    pixels = listed(frame, first, rows, above=1)
-    if len(pixels) == 0:
+    if slots < 2:
         return
-    pixel_list = frame.ctx.buffer(pixels)
-    pixel_list.bind_to_storage_buffer(_PIXELS)
-    over_pixels(frame, "abuffer-array/sort.comp", len(pixels), slots=slots, make=True)
+    shader, pixels = "abuffer-array/sort.comp", part.rows * frame.width
+    given: dict[str, Any] = {"slots": slots, "first_pixel": part.first * frame.width}
+    over_pixels(frame, shader, pixels, **given, make=True)
     # Taking one is a turn, and one for each level of the heap.
     step = TURNS // (1 + slots.bit_length())
     for taken in range(0, slots, step):
-        uniforms = {"slots": slots, "make": False, "first_taken": taken, "last_taken": taken + step - 1}
-        over_pixels(frame, "abuffer-array/sort.comp", len(pixels), **uniforms)
+        over_pixels(frame, shader, pixels, **given, make=False, first_taken=taken, last_taken=taken + step - 1)

@@ -11,10 +11,19 @@ from __future__ import annotations
 
 import moderngl
 
-from renderer.csr import offsets_of
 from renderer.frame import Clock, Frame
 from renderer.screen import TURNS, read_linear
-from renderer.techniques.bands import in_bands, listed, over_pixels, rows_of
+from renderer.techniques.bands import (
+    Part,
+    check_most,
+    count_pixels,
+    count_totals,
+    in_bands,
+    offsets_from,
+    over_pixels,
+    parts_of,
+    read_counts,
+)
 from renderer.techniques.base import Budget, Rendered
 from renderer.techniques.skips import frame_skips
 
@@ -25,9 +34,11 @@ _END = 0xFFFFFFFF
 _TURNS_A_LEVEL = 3
 """Of the sort's loops, for each fragment, at most."""
 
-# Storage bindings of abuffer-list/*; the sort has the list of pixels where the other passes have the counter of nodes.
+_PIXEL_BYTES = 4 + 4
+"""n and the head of the list."""
+
+# Storage bindings of abuffer-list/*.
 _HEADS, _NODES, _USED, _COUNTS = range(4)
-_PIXELS = _USED
 
 
 class ABufferList:
@@ -42,54 +53,57 @@ class ABufferList:
             Problem: One row of the window alone has more fragments than a storage buffer holds, or one pixel has more
                 than a shader can go through.
         """
-        n = frame.count()
-        offsets = offsets_of(n)
         clock = Clock(frame.ctx)
+        counted = count_pixels(frame, clock)
+        total, most = count_totals(frame, clock, counted.counts)
+        check_most(most)
 
-        def store(first: int, rows: int) -> list[moderngl.Buffer]:
-            begin, end = first * frame.width, (first + rows) * frame.width
+        def store(part: Part) -> list[moderngl.Buffer]:
             with clock.measure("list"):
-                buffers = _lists(frame, first, rows, int(offsets[end] - offsets[begin]))
+                buffers = _lists(frame, part)
             with clock.measure("sort"):
-                _sort(frame, first, rows, int(n[begin:end].max()))
+                _sort(frame, part, counted.counts, most)
             return buffers
 
-        image = in_bands(frame, clock, rows_of(offsets, frame), NODE_BYTES, store, "abuffer-list/resolve.frag")
-        total = int(offsets[-1])
+        parts = parts_of(frame, total, NODE_BYTES, lambda: offsets_from(frame, counted.counts))
+        image = in_bands(frame, clock, counted.tiles, parts, store, "abuffer-list/resolve.frag")
+        linear = read_linear(frame, image)
         return Rendered(
-            linear=read_linear(frame, image),
-            k=n.astype("i4"),
-            passes={**frame.passes("opaque", "count"), **clock.passes},
+            linear=linear,
+            k=read_counts(frame, counted.counts),
+            passes={**frame.passes("opaque"), **clock.passes},
             captured=total,
             pool_bytes=NODE_BYTES * total,
-            pixel_bytes=12 + 4 + 4,
-            skips=frame_skips(frame),
+            pixel_bytes=_PIXEL_BYTES,
+            skips=frame_skips(frame, counted.tiles),
         )
 
 
-def _lists(frame: Frame, first: int, rows: int, total: int) -> list[moderngl.Buffer]:
+def _lists(frame: Frame, part: Part) -> list[moderngl.Buffer]:
     """The lists of some rows, bound; nodes in the order of arrival, backwards."""
-    heads, used = frame.buffer(rows * frame.width, _END), frame.buffer(1, 0)
-    nodes = frame.ctx.buffer(reserve=NODE_BYTES * max(1, total))
+    heads, used = frame.buffer(part.rows * frame.width, _END), frame.buffer(1, 0)
+    nodes = frame.ctx.buffer(reserve=NODE_BYTES * max(1, part.items))
     for binding, buffer in ((_HEADS, heads), (_NODES, nodes), (_USED, used)):
         buffer.bind_to_storage_buffer(binding)
-    frame.draw_transparent("abuffer-list/append.frag", frame.target([]), scissor=(first, rows), first_row=first)
+    rows = (part.first, part.rows)
+    frame.draw_transparent("abuffer-list/append.frag", frame.target([]), scissor=rows, first_row=part.first)
     frame.ctx.memory_barrier()
     return [heads, nodes]
 
 
-def _sort(frame: Frame, first: int, rows: int, most: int) -> None:
+def _sort(frame: Frame, part: Part, counts: moderngl.Buffer, most: int) -> None:
     """Sort the bound lists, of up to `most` fragments: a dispatch for as many levels as its loops may take turns."""
-    pixels = listed(frame, first, rows, above=1)
-    if len(pixels) == 0:
-        return
-    pixel_list = frame.ctx.buffer(pixels)
-    pixel_list.bind_to_storage_buffer(_PIXELS)
-    frame.depth_range()[0].bind_to_storage_buffer(_COUNTS)
-    levels = max(1, TURNS // (_TURNS_A_LEVEL * most))
+    counts.bind_to_storage_buffer(_COUNTS)
+    levels = max(1, TURNS // (_TURNS_A_LEVEL * max(1, most)))
     run = 1
     while run < most:
         last = run << min(levels - 1, 30)
-        uniforms = {"first_pixel": first * frame.width, "first_run": run, "last_run": min(last, 1 << 30)}
-        over_pixels(frame, "abuffer-list/sort.comp", len(pixels), **uniforms)
+        over_pixels(
+            frame,
+            "abuffer-list/sort.comp",
+            part.rows * frame.width,
+            first_pixel=part.first * frame.width,
+            first_run=run,
+            last_run=min(last, 1 << 30),
+        )
         run = 2 * last

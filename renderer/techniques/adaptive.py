@@ -22,7 +22,8 @@ class Adaptive:
     order, so that pictures do not vary between runs. Equal depths are ordered by the packed colour, as in every
     technique, where in the paper each of them sees the same visibility: that makes light (more than all of it for many
     coincident surfaces). Here they enclose no area, so their nodes go first, and all but the first of them are then
-    dimmed by the whole group. Memory is that of the captured fragments.
+    dimmed by the whole group. Memory is that of the captured fragments; with
+    interlock and a second geometry pass it would be the nodes, 8 bytes each: depth and transmittance (`node_bytes`).
 
     Args:
         nodes: Nodes of the visibility function, 2..16.

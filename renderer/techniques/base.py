@@ -45,6 +45,8 @@ class Rendered:
         pool_bytes: Bytes of storage that depend on the number of fragments or slots.
         pixel_bytes: Bytes a pixel of all other buffers that live beside the pool. The picture itself is not counted.
         early_bytes: Bytes a pixel at most before there is a pool, where that is known to be more than none.
+        node_bytes: Bytes a pixel of a technique that keeps nodes in place where a device has fragment-shader interlock,
+            as its authors count them; what is allocated here is its emulation. None: the technique is what is here.
         skips: What was not needed and is exact without it: words -> how often. See `renderer.techniques.skips`.
     """
 
@@ -55,12 +57,18 @@ class Rendered:
     pool_bytes: int
     pixel_bytes: int
     early_bytes: int = 0
+    node_bytes: int | None = None
     skips: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def total_bytes(self) -> int:
         """The peak of the frame: the pool and what lives beside it, or what was there before."""
         return max(self.pool_bytes + self.pixel_bytes * len(self.k), self.early_bytes * len(self.k))
+
+    @property
+    def compared_bytes(self) -> int:
+        """What a technique's memory is compared by: the peak of the frame, or its nodes where those are emulated."""
+        return self.total_bytes if self.node_bytes is None else self.node_bytes * len(self.k)
 
     @property
     def milliseconds(self) -> float:

@@ -14,35 +14,35 @@ the last bits of the one-pass tail may differ from run to run there.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.bands import row_bands
+from renderer.bin_pass import KEPT_UNIT, Binned
 from renderer.csr import offsets_of
-from renderer.frame import BIN_DEFINES, Clock, Frame, Gathered
+from renderer.frame import Clock, Frame
 from renderer.programs import Defines
 from renderer.screen import TURNS, read_linear, resolve_screen
 from renderer.techniques.base import Budget, Rendered
 from renderer.techniques.skips import PREDICTOR, TAIL, frame_skips
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
-from schemas.tail import DENSITY_BINS, MAX_EXPONENT, TailName
+from schemas.tail import DENSITY_G, MAX_EXPONENT, NO_TAIL, TAILS, Tail, TailKind
 
 SLOT_BYTES = 8
 """Depth and packed colour."""
 RANGE_BYTES = 12
 """n and depth range of a pixel."""
+OFFSET_BYTES = 4
+"""Where a pixel's run of slots begins."""
 
 _EXTENSIONS = frozenset({"GL_NV_shader_atomic_int64", "GL_ARB_gpu_shader_int64"})
 _EMPTY = 0xFFFFFFFF
-_TAIL_CODES: dict[TailName, int] = {"exact-coverage": 0, "density": 1, "weighted-average": 2, "paper": 3}
-_BINNED = 4
-_NO_TAIL = -1
 
 # Storage bindings of kbuffer/*.frag; the slots of the one-pass chain are where the colours of the other are.
-_OFFSETS, _DEPTHS, _COLOURS, _Z_MIN, _Z_MAX, _FRONT, _MEMORY = range(7)
+_OFFSETS, _DEPTHS, _COLOURS, _Z_MIN, _Z_MAX, _, _MEMORY = range(7)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,22 +59,73 @@ class Memory:
 
 
 @dataclass(frozen=True, slots=True)
-class _Tail:
-    """What the tail needs: its code in the shaders, the density tail's constant, where the optical depth lies.
+class TailInputs:
+    """What a tail reads while fragments are captured.
 
-    `memory` is where resolving notes what last core fragments change, if anywhere.
+    Attributes:
+        tail: Its row; None: every fragment has a slot, and there is no tail.
+        g: The density tail's constant.
+        binned: The depth bins of a tail that has some.
+        density: RGBA32F, of the density tail.
     """
 
-    code: int
-    g: float
-    gathered: Gathered | None
-    memory: Memory | None = None
+    tail: Tail | None
+    g: float = DENSITY_G
+    binned: Binned | None = None
+    density: moderngl.Texture | None = None
 
     @property
     def defines(self) -> Defines:
         """Of the shaders."""
-        bins = self.gathered.bins if self.code == _BINNED and self.gathered is not None else 0
-        return {"TAIL": self.code, **({"BINS": bins, **BIN_DEFINES} if bins else {})}
+        if self.tail is None:
+            return {"TAIL": NO_TAIL}
+        return {**self.tail.defines, "MAX_EXPONENT": MAX_EXPONENT}
+
+    @property
+    def passes(self) -> tuple[str, ...]:
+        """The passes of the frame that made them."""
+        if self.binned is not None:
+            return "range", "bins"
+        return () if self.density is None else ("gather",)
+
+    @property
+    def pixel_bytes(self) -> int:
+        """Bytes a pixel beside the pool: of what is read, and of the tail's sums."""
+        if self.tail is None:
+            return 0
+        read = self.binned.kept_bytes if self.binned is not None else 16 if self.density is not None else 0
+        return read + self.tail.sum_bytes
+
+    @property
+    def early_bytes(self) -> int:
+        """Bytes a pixel while it is gathered."""
+        return self.binned.gathered_bytes if self.binned is not None else 0
+
+    def bind(self) -> dict[str, Any]:
+        """Bind it; the uniforms of the shaders."""
+        if self.binned is not None:
+            self.binned.bind()
+        if self.density is not None:
+            self.density.use(KEPT_UNIT)
+        return {"gathered": KEPT_UNIT, "density_g": self.g}
+
+
+def tail_inputs(frame: Frame, budget: Budget, *, complete: bool = False) -> TailInputs:
+    """Gather what a tail reads.
+
+    Args:
+        frame: The view.
+        budget: Its tail.
+        complete: Whether every fragment has a slot: then there is no tail.
+    """
+    if complete:
+        return TailInputs(None)
+    tail = TAILS[budget.tail]
+    if tail.kind == TailKind.BINNED:
+        return TailInputs(tail, budget.g, binned=frame.gather_bins(budget.tail))
+    if tail.kind == TailKind.DENSITY:
+        return TailInputs(tail, budget.g, density=frame.gather_density())
+    return TailInputs(tail, budget.g)
 
 
 def one_pass_available(ctx: moderngl.Context) -> bool:
@@ -87,7 +138,6 @@ def render_chain(
     slots: NDArray[np.integer],
     n: NDArray[np.integer],
     budget: Budget,
-    gathered: Gathered | None = None,
     before: int = 0,
 ) -> Rendered:
     """Capture the nearest fragments into given slots, add the tail, resolve.
@@ -99,8 +149,7 @@ def render_chain(
         slots: int [P], slots a pixel gets; may exceed n(p), then some stay empty.
         n: int [P], fragments of each pixel.
         budget: Tail, its constant, and the form of the chain; `sum slots` is not checked against it here.
-        gathered: What the technique has gathered to choose its slots, if anything. It stays, whatever the tail reads.
-        before: Bytes a pixel that the technique needed at once to choose them.
+        before: Bytes a pixel that the technique needed at once to choose them, beside n and the depth range.
 
     Returns:
         The picture; passes in order, memory as allocated.
@@ -109,83 +158,27 @@ def render_chain(
         Problem: The pool is larger than a storage buffer may be, or the driver lacks the form that was asked for.
     """
     complete = bool((slots >= n).all())
-    own = gathered
-    if not complete:
-        gathered = gathered_for_tail(frame, budget, gathered)
-    beside = 0 if own is None or own is gathered else own.pixel_bytes
-    sums = [each.pass_bytes + (beside if each is gathered else 0) for each in (own, gathered) if each is not None]
-    before = max(before, RANGE_BYTES + max(sums, default=0))
-    needed = ["count"] if gathered is None else ["count", gathered.name]
+    inputs = tail_inputs(frame, budget, complete=complete)
     clock = Clock(frame.ctx)
     with clock.measure("prefix"):
         offsets = offsets_of(slots)
         offset_buffer = frame.ctx.buffer(offsets.astype(np.uint32))
     _check_turns(offsets)
     total = int(offsets[-1])
-    image = draw_chain(frame, clock, offset_buffer, total, budget, gathered, complete=complete)
+    offset_buffer.bind_to_storage_buffer(_OFFSETS)
+    chain = _one_pass if _is_one_pass(frame.ctx, budget, total) else _two_pass
+    image = chain(frame, clock, total, inputs)
     k = np.minimum(slots, n).astype(np.int32)
     return Rendered(
         linear=read_linear(frame, image),
         k=k,
-        passes={**frame.passes("opaque", *needed), **clock.passes},
+        passes={**frame.passes("opaque", "count", *inputs.passes), **clock.passes},
         captured=int(k.sum(dtype=np.int64)),
         pool_bytes=SLOT_BYTES * total,
-        pixel_bytes=chain_bytes(gathered, None if complete else budget.tail) + beside,
-        early_bytes=before,
+        pixel_bytes=OFFSET_BYTES + RANGE_BYTES + inputs.pixel_bytes,
+        early_bytes=RANGE_BYTES + max(before, inputs.early_bytes),
         skips={**frame_skips(frame), TAIL: int(complete)},
     )
-
-
-def draw_chain(
-    frame: Frame,
-    clock: Clock,
-    offsets: moderngl.Buffer,
-    total: int,
-    budget: Budget,
-    gathered: Gathered | None,
-    *,
-    complete: bool,
-    memory: Memory | None = None,
-) -> moderngl.Texture:
-    """The passes of the chain, from slots that are on the GPU to the picture.
-
-    Args:
-        frame: The view.
-        clock: Gets the passes.
-        offsets: uint32 [P+1], where each pixel's run of slots begins.
-        total: Slots of the pool; at least the last offset.
-        budget: As `render_chain` has it.
-        gathered: What the tail needs, from `gathered_for_tail`.
-        complete: Whether every fragment is known to have a slot: then there is no tail.
-        memory: Where to note what each pixel's last core fragment changes; not with `complete`.
-
-    Returns:
-        RGBA32F, linear.
-
-    Raises:
-        Problem: As `render_chain` has it.
-    """
-    offsets.bind_to_storage_buffer(_OFFSETS)
-    code = _BINNED if budget.tail in DENSITY_BINS else _TAIL_CODES[budget.tail]
-    tail = _Tail(_NO_TAIL if complete else code, budget.g, gathered, memory)
-    chain = _one_pass if _is_one_pass(frame.ctx, budget, total) else _two_pass
-    return chain(frame, clock, total, tail)
-
-
-def gathered_for_tail(frame: Frame, budget: Budget, gathered: Gathered | None) -> Gathered | None:
-    """What a tail reads while fragments are captured: what is gathered already, if that serves it.
-
-    Args:
-        frame: The view.
-        budget: Its tail.
-        gathered: What the technique has gathered to choose its slots, if anything.
-    """
-    bins = DENSITY_BINS.get(budget.tail, 0)
-    if bins:
-        return gathered if gathered is not None and gathered.bins == bins else frame.gather("gather-tail", bins=bins)
-    if budget.tail == "density" and (gathered is None or gathered.bins):
-        return frame.gather("gather-tail")
-    return gathered
 
 
 def render_complete(frame: Frame, n: NDArray[np.integer], budget: Budget) -> Rendered | None:
@@ -202,12 +195,6 @@ def render_complete(frame: Frame, n: NDArray[np.integer], budget: Budget) -> Ren
     return replace(rendered, skips={**rendered.skips, PREDICTOR: 1})
 
 
-def chain_bytes(gathered: Gathered | None, tail: TailName | None) -> int:
-    """Bytes a pixel: offsets, n and depth range, the tail's targets if there is one, what the gather pass left."""
-    targets = 0 if tail is None else 16 if tail in DENSITY_BINS else 2 * 16
-    return 4 + RANGE_BYTES + targets + (0 if gathered is None else gathered.pixel_bytes)
-
-
 def _is_one_pass(ctx: moderngl.Context, budget: Budget, total: int) -> bool:
     available = one_pass_available(ctx)
     if budget.chain == "auto":
@@ -222,16 +209,16 @@ def _is_one_pass(ctx: moderngl.Context, budget: Budget, total: int) -> bool:
     return budget.chain == "one-pass"
 
 
-def _one_pass(frame: Frame, clock: Clock, total: int, tail: _Tail) -> moderngl.Texture:
+def _one_pass(frame: Frame, clock: Clock, total: int, tail: TailInputs) -> moderngl.Texture:
     with clock.measure("chain"):
         slots = frame.buffer(2 * total, _EMPTY)
         slots.bind_to_storage_buffer(_COLOURS)
         tails = _draw_with_tail(frame, "kbuffer/chain.frag", tail)
     with clock.measure("resolve"):
-        return _resolve(frame, tail, tails, stride=2)
+        return resolve_slots(frame, tail, tails, stride=2)
 
 
-def _two_pass(frame: Frame, clock: Clock, total: int, tail: _Tail) -> moderngl.Texture:
+def _two_pass(frame: Frame, clock: Clock, total: int, tail: TailInputs) -> moderngl.Texture:
     with clock.measure("chain-depth"):
         depths, colours = frame.buffer(total, _EMPTY), frame.buffer(total, _EMPTY)
         depths.bind_to_storage_buffer(_DEPTHS)
@@ -241,72 +228,55 @@ def _two_pass(frame: Frame, clock: Clock, total: int, tail: _Tail) -> moderngl.T
     with clock.measure("chain-colour"):
         tails = _draw_with_tail(frame, "kbuffer/chain_colour.frag", tail)
     with clock.measure("resolve"):
-        return _resolve(frame, tail, tails, stride=1)
+        return resolve_slots(frame, tail, tails, stride=1)
 
 
-def _draw_with_tail(frame: Frame, fragment: str, tail: _Tail) -> list[moderngl.Texture]:
+def _draw_with_tail(frame: Frame, fragment: str, tail: TailInputs) -> list[moderngl.Texture]:
     """Draw into the bound slots; the targets that hold the tail's sums, or none."""
-    tails: list[moderngl.Texture] = []
-    if tail.code != _NO_TAIL:
-        tails = frame.float_targets(*[4] * (1 if tail.code == _BINNED else 2))
+    tails = tail_targets(frame, tail)
+    if tail.density is not None:
         _, z_min, z_max = frame.depth_range()
         z_min.bind_to_storage_buffer(_Z_MIN)
         z_max.bind_to_storage_buffer(_Z_MAX)
-        if tail.gathered is not None:
-            tail.gathered.sums[0].use(0)
-            if tail.gathered.front is not None:
-                tail.gathered.front.bind_to_storage_buffer(_FRONT)
-    defines = {**tail.defines, "MAX_EXPONENT": MAX_EXPONENT}
-    frame.draw_transparent(fragment, frame.target(tails), defines, gathered=0, density_g=tail.g)
+    frame.draw_transparent(fragment, frame.target(tails), tail.defines, **tail.bind())
     frame.ctx.memory_barrier()
     return tails
 
 
-def _resolve(frame: Frame, tail: _Tail, tails: list[moderngl.Texture], stride: int) -> moderngl.Texture:
-    """Composite the bound pool (offsets, colours) over the tail and the background; RGBA32F, linear."""
-    textures, defines = [frame.background, *tails], {**tail.defines, "STRIDE": stride}
-    if tail.memory is None:
-        return resolve_screen(frame, "kbuffer/resolve.frag", textures, defines, first_row=0)
-    # What falls back into the tail is weighed as the chain weighs it.
-    tail.memory.buffer.bind_to_storage_buffer(_MEMORY)
-    if tail.gathered is not None:
-        textures.append(tail.gathered.sums[0])
-    defines |= {"OBSERVE": 1, "MAX_EXPONENT": MAX_EXPONENT, **tail.memory.defines}
-    image = resolve_screen(
-        frame, "kbuffer/resolve.frag", textures, defines, first_row=0, gathered=len(textures) - 1, density_g=tail.g
-    )
-    frame.ctx.memory_barrier()
-    return image
+def tail_targets(frame: Frame, tail: TailInputs) -> list[moderngl.Texture]:
+    """Targets for a tail's sums, zero: weighted colour and weight, and its opacity; none without a tail."""
+    if tail.tail is None:
+        return []
+    return frame.float_targets(4, 1 if tail.tail.bins else 4)
 
 
-def resolve_all(frame: Frame, offsets: NDArray[np.int64], packed: NDArray[np.uint32]) -> NDArray[np.float32]:
-    """Composite a sorted pool that holds every fragment: no tail.
+def resolve_slots(
+    frame: Frame,
+    tail: TailInputs,
+    tails: list[moderngl.Texture],
+    stride: int,
+    memory: Memory | None = None,
+    ends: Defines | None = None,
+) -> moderngl.Texture:
+    """Composite the bound pool (offsets, colours) over the tail and the background; RGBA32F, linear.
 
     Args:
         frame: The view.
-        offsets: int64 [P+1].
-        packed: uint32 [N], front to back inside a pixel.
-
-    Returns:
-        float32 [H, W, 3], linear.
-
-    Raises:
-        Problem: One pixel has more fragments than a shader can visit, or one row more than a storage buffer holds.
+        tail: Of the tail.
+        tails: Its sums, from `tail_targets`.
+        stride: Words of a slot.
+        memory: Where to note what each pixel's last core fragment changes; only with a tail.
+        ends: Further defines of `kbuffer/resolve.frag`, where runs end elsewhere than at the next one's begin.
     """
-    _check_turns(offsets)
-    image = frame.ctx.texture((frame.width, frame.height), 4, dtype="f4")
-    for first, rows in row_bands(offsets, frame.width, LIMITS.buffer_bytes // 4) or [(0, frame.height)]:
-        run = offsets[first * frame.width : (first + rows) * frame.width + 1]
-        offset_buffer = frame.ctx.buffer(
-            (run - run[0]).astype(np.uint32)
-        )  # named, or it would be freed before it is read
-        pool = frame.ctx.buffer(np.ascontiguousarray(packed[run[0] : run[-1]]) if run[-1] > run[0] else bytes(4))
-        offset_buffer.bind_to_storage_buffer(_OFFSETS)
-        pool.bind_to_storage_buffer(_COLOURS)
-        band = (image, first, rows)
-        defines = {"TAIL": _NO_TAIL, "STRIDE": 1}
-        resolve_screen(frame, "kbuffer/resolve.frag", [frame.background], defines, band, first_row=first)
-    return read_linear(frame, image)
+    textures, defines = [frame.background, *tails], {**tail.defines, "STRIDE": stride, **(ends or {})}
+    if memory is None:
+        return resolve_screen(frame, "kbuffer/resolve.frag", textures, defines, first_row=0)
+    # What falls back into the tail is weighed as it was when it was captured.
+    memory.buffer.bind_to_storage_buffer(_MEMORY)
+    defines |= {"OBSERVE": 1, **memory.defines}
+    image = resolve_screen(frame, "kbuffer/resolve.frag", textures, defines, first_row=0, **tail.bind())
+    frame.ctx.memory_barrier()
+    return image
 
 
 def _check_turns(offsets: NDArray[np.int64]) -> None:

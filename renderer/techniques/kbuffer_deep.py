@@ -1,16 +1,14 @@
-"""`kbuffer-deep`: k(p) from a bundle's network, run as its own GLSL on sums gathered in the frame (METHOD.md 4).
+"""`kbuffer-deep`: whole bins of every pixel by a bundle's network, run as its own GLSL (METHOD.md 4).
 
-Nothing is read back within a frame: the network's curves stay on the GPU, where the one lambda is found that uses the
-budget (`renderer.allocation.gpu`), and the pool has as many slots as the budget allows. Importances are turned into
-curves (`renderer.allocation.lattice.importance_curves`). What the network has read is given back before fragments are
-captured, and so are its curves, unless another budget of the same frame is to need no inference.
+Two geometry passes. The first gathers depth bins, the fragments in each, and sums of colours; of those the network
+predicts every pixel's gain curve, and a price is selected that uses the budget (`renderer.allocation.gpu`). So it is
+known how many of its bins are a pixel's core, and how many fragments they have: the second pass appends these and
+blends the others into the tail. Then cores are sorted and resolved. Nothing is read back within a frame, and the
+picture is the same to the bit whatever the order of the fragments, but for the rounding of the tail's sums.
 """
 
 from __future__ import annotations
 
-import re
-import weakref
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -19,68 +17,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import timing
-from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
-from renderer.allocation.gpu import CURVE_BYTES, CURVE_DEFINES, LIST_BYTES, FrameAllocation, GpuAllocation
-from renderer.allocation.lattice import within_limits
-from renderer.features import TEXELS, texels_of
-from renderer.frame import ALL_TEXELS, BIN_DEFINES, Clock, Frame, Gathered, front_bytes
-from renderer.gpu_scene import set_uniforms
+from renderer.allocation.cuts import events_of, importance_curve, solve_cuts
+from renderer.allocation.gpu import CURVE_BYTES, DEFINES, FrameAllocation
+from renderer.bin_pass import Binned
+from renderer.csr import offsets_of
+from renderer.features import TEXELS, reads_colours
+from renderer.frame import Clock, Frame
+from renderer.gpu_scene import run_for, set_uniforms
 from renderer.onnx_network import OnnxNetwork
 from renderer.programs import Defines
 from renderer.screen import read_linear
 from renderer.techniques.base import Budget, Rendered
 from renderer.techniques.chain import (
-    RANGE_BYTES,
+    OFFSET_BYTES,
     SLOT_BYTES,
     Memory,
-    chain_bytes,
-    draw_chain,
-    gathered_for_tail,
-    render_chain,
-    render_complete,
+    TailInputs,
+    resolve_slots,
+    tail_targets,
 )
-from renderer.techniques.skips import PREDICTOR, SETTLED_PIXELS, TAIL, UNREAD_SUMS, frame_skips
+from renderer.techniques.skips import PREDICTOR, UNREAD_COLOURS, frame_skips
 from schemas.bundle import GLSL, ONNX, load_manifest
 from schemas.limits import LIMITS
-from schemas.tail import DENSITY_BINS
+from schemas.problem import ExitCode, Problem
+from schemas.tail import TAILS
 
 Inference = Literal["glsl", "onnx"]
-Solver = Literal["gpu", "cpu"]
 
 _GROUP = 64
-FIRST_SUM_BYTES = 16
-"""Of the sums that a tail without bins may read, and that stay."""
 _DISPATCH = 65535 * _GROUP
 """Pixels of one dispatch: the least maximum of work groups that GL promises."""
 
-# Storage bindings of kbuffer-deep/*.comp; their textures are bound in the order of their declarations.
-_PIXELS, _Z_MIN, _Z_MAX, _NEAREST, _RESULT = range(5)
-_COUNTS, _FRONT = 6, 7
-_STATE, _CURVES = 0, 5
-
-
-@dataclass(frozen=True, slots=True)
-class _Prediction:
-    """What the network answered in a frame, kept for its other budgets."""
-
-    frame: weakref.ref[Frame]
-    gathered: Gathered
-    curves: moderngl.Buffer
-    passes: dict[str, float]
-    before_bytes: int
-    k_min: int
-    occupied: int
-
-    def serves(self, frame: Frame, fragments: int) -> bool:
-        """Whether a budget of a frame can be solved with it: with a lower k_min more pixels need curves."""
-        return self.frame() is frame and int(fragments >= self.occupied) >= self.k_min
-
-
-def before_bytes(gathered: Gathered) -> int:
-    """Bytes a pixel at most until fragments are captured: gathering, running the network, or choosing slots."""
-    kept = front_bytes(gathered.bins) or FIRST_SUM_BYTES
-    predicting, choosing = gathered.pixel_bytes + CURVE_BYTES, kept + CURVE_BYTES + LIST_BYTES
-    return RANGE_BYTES + max(gathered.pass_bytes, predicting, choosing)
+# Storage bindings: of capturing and resolving, and of kbuffer-deep/predict.comp; those of curves.comp are the
+# allocation's.
+_OFFSETS, _COUNTS, _POOL, _, _RESULT = range(5)
+_PIXELS, _CURVES = 0, 2
 
 
 class KBufferDeep:
@@ -88,199 +59,158 @@ class KBufferDeep:
 
     Args:
         bundle: Folder of a bundle; its hashes are verified.
-        inference: `glsl`: the bundle's shader; `onnx`: onnxruntime on features that are read back, for machines whose
-            "GPU" is the CPU, where a shader's matrix products do not use its vector units well.
-        solver: Where the slots are chosen: `gpu` in compute passes, `cpu` in numpy with two readbacks; None: where the
-            network runs. The counts are the same but for ties and roundings.
-        keeps_curves: Whether what the network answers on the GPU stays there while fragments are captured: eight bytes
-            a pixel, with which another budget of the same frame needs no inference.
+        inference: `glsl`: the bundle's shader; `onnx`: onnxruntime on features that are read back, and cuts chosen in
+            numpy, for machines whose "GPU" is the CPU, where a shader's matrix products do not use its vector units
+            well. The cuts are the same but for what the network rounds.
 
     Raises:
         Problem: The bundle is damaged or not understood.
-        ValueError: The GPU is to solve what onnxruntime predicts.
     """
 
     name = "kbuffer-deep"
 
-    def __init__(
-        self,
-        bundle: Path,
-        inference: Inference = "glsl",
-        solver: Solver | None = None,
-        *,
-        keeps_curves: bool = False,
-    ) -> None:
+    def __init__(self, bundle: Path, inference: Inference = "glsl") -> None:
         self.manifest = load_manifest(bundle)
-        if solver == "gpu" and inference == "onnx":
-            raise ValueError("the GPU solves what GLSL predicts")
         self._texts = {"bundle/predict.glsl": (bundle / GLSL).read_text(encoding="utf-8")}
-        self._bins = DENSITY_BINS.get(self.manifest.tail.name, 0)
-        self._texels = texels_of(self.manifest.feature_names, binned=bool(self._bins))
-        self._unread = len(ALL_TEXELS - self._texels - (frozenset() if self._bins else {0}))  # what is not gathered
-        # Bundles of format 1 were written when there were fewer sums.
-        texels = re.search(r"in vec4 s\[(\d+)\]", self._texts["bundle/predict.glsl"])
+        self._tail = TAILS[self.manifest.tail.name]
+        self._colours = reads_colours(self.manifest.feature_names)
         self._defines: Defines = {
-            **{"TEXELS": TEXELS if texels is None else int(texels[1]), "BINS": self._bins},
-            "OUTPUTS": len(self.manifest.outputs),
-            **(BIN_DEFINES if self._bins else {}),
+            **{"TEXELS": TEXELS, "COLOURS": int(self._colours), "OUTPUTS": len(self.manifest.outputs)},
+            **self._tail.defines,
+            **DEFINES,
         }
         self._network = OnnxNetwork(bundle / ONNX) if inference == "onnx" else None
-        self._solver = solver or ("gpu" if inference == "glsl" else "cpu")
-        self._keeps_curves = keeps_curves
-        self._allocation: GpuAllocation | None = None
-        self._prediction: _Prediction | None = None
         self._memory: Memory | None = None  # of a technique that learns from what it resolves
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
-        """Render a frame with predicted slots; the budget is met exactly where it is below N."""
-        # A pool larger than a buffer may be is bounded by N, which has to be read for that.
-        if self._solver == "cpu" or frame.counted or 4 * budget.fragments > LIMITS.buffer_bytes:
-            complete = render_complete(frame, frame.count(), budget)
-            if complete is not None:
-                return complete
-        return self._render_on_cpu(frame, budget) if self._solver == "cpu" else self._render_on_gpu(frame, budget)
+        """Render a frame with predicted cuts; `sum k` is at most the budget, and less by at most one bin of one pixel.
 
-    def _render_on_gpu(self, frame: Frame, budget: Budget) -> Rendered:
-        counts, _, _ = frame.depth_range()
-        if self._allocation is None:
-            self._allocation = GpuAllocation(frame.ctx)
-        kept = self._prediction if self._prediction and self._prediction.serves(frame, budget.fragments) else None
-        gathered = frame.gather("gather", self._texels, self._bins) if kept is None else kept.gathered
-        before = before_bytes(gathered) if kept is None else kept.before_bytes
+        Raises:
+            Problem: The budget asks for another tail than the bundle was made for, or the pool is too large.
+        """
+        if budget.tail != self.manifest.tail.name:
+            raise Problem(
+                f"{self.name} renders the tail its bundle was trained with, {self.manifest.tail.name}, "
+                f"not {budget.tail}.",
+                f"Leave out --tail, or train a bundle with `diaphane build --tail {budget.tail}`.",
+                ExitCode.USAGE,
+            )
+        binned = frame.gather_bins(budget.tail, colours=self._colours, counts=True)
+        frame.forget_bins(binned)  # its counts become cuts
+        early = max(binned.gathered_bytes, binned.kept_bytes + CURVE_BYTES)
         clock = Clock(frame.ctx)
-        with clock.measure("select"):
-            allocation = self._allocation.select(frame.gpu.programs, counts, frame.pixels, budget.fragments)
-        if kept is None:
-            with clock.measure("predict"):
-                curves = self._curves(frame, gathered, allocation)
-            gathered = frame.retire(gathered)
+        if self._network is None:
+            allocation = FrameAllocation(frame.ctx, frame.gpu.programs, binned, frame.pixels, budget.fragments)
+            offsets = self._place(frame, binned, allocation, clock)
         else:
-            curves = kept.curves
-            clock.passes |= kept.passes
-        with clock.measure("lambda"):
-            allocation.solve(curves)
-        with clock.measure("prefix"):
-            offsets = allocation.place()
-        if not self._keeps_curves:
-            allocation.forget_curves()
-            del curves
-        for_tail = gathered_for_tail(frame, budget, gathered)
-        read = [] if for_tail is None or for_tail.name == "gather" else [for_tail.name]
-        image = draw_chain(
-            frame, clock, offsets, budget.fragments, budget, for_tail, complete=False, memory=self._memory
-        )
+            offsets, complete = self._place_on_cpu(frame, binned, budget.fragments, clock)
+        binned.colours.clear()
+        image = self._draw(frame, clock, binned, offsets, budget)
         linear = read_linear(frame, image)
         # The frame is over: what follows are its statistics.
-        state = allocation.read_state()
-        k = np.diff(np.frombuffer(offsets.read(), dtype=np.uint32).astype(np.int64)).astype(np.int32)
-        if kept is None and self._keeps_curves and not state.complete:
-            predicted = {"predict": clock.passes["predict"]}
-            self._prediction = _Prediction(
-                weakref.ref(frame), gathered, curves, predicted, before, state.k_min, state.occupied
-            )
-        pool_bytes = SLOT_BYTES * budget.fragments
-        during = chain_bytes(for_tail, budget.tail) + (CURVE_BYTES if self._keeps_curves else 0)
-        during += 0 if for_tail is gathered else gathered.pixel_bytes  # beside what another tail than its own reads
-        skips = {PREDICTOR: int(state.complete), SETTLED_PIXELS: state.settled, TAIL: 0}
+        if self._network is None:
+            complete = allocation.read_state().complete
+        k = self._kept(frame, binned, offsets)
         return Rendered(
             linear=linear,
             k=k,
-            passes={**frame.passes("opaque", "count", "gather", *read), **clock.passes},
+            passes={**frame.passes("opaque", "range", "bins"), **clock.passes},
             captured=int(k.sum(dtype=np.int64)),
-            pool_bytes=pool_bytes,
-            pixel_bytes=during,
-            early_bytes=before,
-            skips={**frame_skips(frame), **skips, UNREAD_SUMS: self._unread},
+            pool_bytes=SLOT_BYTES * budget.fragments,
+            pixel_bytes=binned.kept_bytes + OFFSET_BYTES + self._tail.sum_bytes,
+            early_bytes=early,
+            skips={**frame_skips(frame), PREDICTOR: int(complete), UNREAD_COLOURS: int(not self._colours)},
         )
 
-    def _curves(self, frame: Frame, gathered: Gathered, allocation: FrameAllocation) -> moderngl.Buffer:
-        """Run the network on the pixels that have a choice."""
-        program = frame.gpu.programs.compute(
-            "kbuffer-deep/curves.comp", {**CURVE_DEFINES, **self._defines}, self._texts
-        )
+    def _place(self, frame: Frame, binned: Binned, allocation: FrameAllocation, clock: Clock) -> moderngl.Buffer:
+        """Predict curves and choose cuts on the GPU; the offsets of the cores in the pool."""
+        with clock.measure("predict"):
+            allocation.begin()
+            curves = self._curves(frame, binned, allocation)
+        with clock.measure("allocate"):
+            return allocation.place(curves)
+
+    def _curves(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> moderngl.Buffer:
+        """Run the network on the occupied pixels."""
+        program = frame.gpu.programs.compute("kbuffer-deep/curves.comp", self._defines, self._texts)
         curves = frame.buffer(CURVE_BYTES // 4 * frame.pixels, None)
-        self._bind(frame, gathered)
+        self._bind(frame, binned)
         curves.bind_to_storage_buffer(_CURVES)
-        set_uniforms(program, {"width": frame.width, "pixels": frame.pixels})
-        allocation.run_pixels(program, _STATE)
+        set_uniforms(program, {"width": frame.width})
+        allocation.run_pixels(program)
         return curves
 
-    def _render_on_cpu(self, frame: Frame, budget: Budget) -> Rendered:
-        n = frame.count()
-        gathered = frame.gather("gather", self._texels, self._bins)
-        clock = Clock(frame.ctx)
-        slots, settled = self._allocate(frame, n, budget.fragments, clock)
-        # What is read back of every open pixel, and the list of them.
-        columns = len(self.manifest.outputs if self._network is None else self.manifest.features)
-        answers = 4 * (1 + columns) * (int(np.count_nonzero(n)) - settled)
-        before = RANGE_BYTES + gathered.pixel_bytes - (-answers // frame.pixels)
-        rendered = render_chain(frame, slots, n, budget, gathered, before)
-        skips = {**rendered.skips, SETTLED_PIXELS: settled, UNREAD_SUMS: self._unread}
-        shared = frame.passes("opaque", "count", "gather")
-        return replace(rendered, passes={**shared, **clock.passes, **rendered.passes}, skips=skips)
-
-    def _allocate(
-        self, frame: Frame, n: NDArray[np.uint32], fragments: int, clock: Clock
-    ) -> tuple[NDArray[np.int32], int]:
-        """Slots of every pixel, and how many occupied pixels needed no network."""
-        k_min = feasible_k_min(n, fragments)
-        slots = np.minimum(n, k_min).astype(np.int32)
-        with clock.measure("select"):
-            open_pixels = np.flatnonzero(n > k_min).astype(np.uint32)
-        settled = int(np.count_nonzero(n)) - len(open_pixels)
-        if len(open_pixels) == 0:
-            return slots, settled
+    def _place_on_cpu(self, frame: Frame, binned: Binned, fragments: int, clock: Clock) -> tuple[moderngl.Buffer, bool]:
+        """The same with the network in onnxruntime, and whether all that can be in a core is."""
+        assert binned.counts is not None, "bins are counted"
+        words = self._tail.bins // 4
         with clock.measure("predict"):
-            answers = self.predict(frame, open_pixels)
-        with clock.measure("lambda"):
-            left = fragments - int(slots.sum(dtype=np.int64)) + k_min * len(open_pixels)
-            if self.manifest.head == "importance":  # NaN, of a network that overflows, is no importance
-                slots[open_pixels] = budget_fill(np.nan_to_num(answers[:, 0]), n[open_pixels], left, k_min)
-            else:
-                a, b = within_limits(answers[:, 0], answers[:, 1])
-                slots[open_pixels], _ = solve_lambda(a, b, n[open_pixels], left, k_min)
-        return slots, settled
+            with timing.readback(frame.ctx):
+                read = np.frombuffer(binned.counts.read(4 * words * frame.pixels), dtype=np.uint8)
+            counts = read.reshape(frame.pixels, self._tail.bins)
+            occupied = np.flatnonzero(counts.any(axis=1)).astype(np.uint32)
+            answers = self._answers(frame, binned, occupied)
+        with clock.measure("allocate"):
+            is_curve = self.manifest.head == "gain-curve"
+            curve = (answers[:, 0], answers[:, 1]) if is_curve else importance_curve(answers[:, 0])
+            found = solve_cuts(events_of(*curve, counts[occupied]), fragments)
+            cores = np.zeros((frame.pixels, words), dtype=np.uint32)
+            k = np.zeros(frame.pixels, dtype=np.int64)
+            cores[occupied, 0], k[occupied] = found.cut, found.k
+            offsets = offsets_of(k)[:-1].astype(np.uint32)
+            cores[:, 1] = offsets
+            binned.counts.write(cores)
+        return frame.ctx.buffer(offsets), found.rank is None
 
     def predict(self, frame: Frame, pixels: NDArray[np.uint32]) -> NDArray[np.float32]:
         """Run the network.
 
         Args:
             frame: The view.
-            pixels: uint32 [M], pixel indices.
+            pixels: uint32 [M], indices of occupied pixels.
 
         Returns:
             float32 [M, outputs of the bundle]: `schemas.bundle.HEADS` says what they are.
         """
-        if self._network is not None:
-            return self._network.run(self.features(frame, pixels))
-        return self._dispatch(frame, pixels, len(self.manifest.outputs), features_only=False)
+        return self._answers(frame, self._counted(frame), pixels)
 
     def features(self, frame: Frame, pixels: NDArray[np.uint32]) -> NDArray[np.float32]:
         """What the network reads of some pixels.
 
         Args:
             frame: The view.
-            pixels: uint32 [M], pixel indices.
+            pixels: uint32 [M], indices of occupied pixels.
 
         Returns:
             float32 [M, features of the bundle], not normalised.
         """
-        return self._dispatch(frame, pixels, len(self.manifest.features), features_only=True)
+        return self._dispatch(frame, self._counted(frame), pixels, len(self.manifest.features), features_only=True)
+
+    def _counted(self, frame: Frame) -> Binned:
+        return frame.gather_bins(self.manifest.tail.name, colours=self._colours, counts=True)
+
+    def _answers(self, frame: Frame, binned: Binned, pixels: NDArray[np.uint32]) -> NDArray[np.float32]:
+        if self._network is None:
+            return self._dispatch(frame, binned, pixels, len(self.manifest.outputs), features_only=False)
+        columns = len(self.manifest.features)
+        return self._network.run(self._dispatch(frame, binned, pixels, columns, features_only=True))
 
     def _dispatch(
-        self, frame: Frame, pixels: NDArray[np.uint32], columns: int, *, features_only: bool
+        self, frame: Frame, binned: Binned, pixels: NDArray[np.uint32], columns: int, *, features_only: bool
     ) -> NDArray[np.float32]:
-        """Run the compute shader on all pixels, as many at once as a storage buffer has rows for."""
-        gathered = frame.gather("gather", self._texels, self._bins)
+        """Run the compute shader on listed pixels, as many at once as a storage buffer has rows for."""
+        out = np.empty((len(pixels), columns), dtype=np.float32)
+        if len(pixels) == 0:
+            return out
         defines = {**self._defines, "FEATURES_ONLY": int(features_only)}
         program = frame.gpu.programs.compute("kbuffer-deep/predict.comp", defines, self._texts)
         rows = min(len(pixels), _DISPATCH, LIMITS.buffer_bytes // (4 * columns))
         result, listed = frame.ctx.buffer(reserve=4 * columns * rows), frame.ctx.buffer(pixels)
-        self._bind(frame, gathered)
-        listed.bind_to_storage_buffer(_PIXELS)
-        result.bind_to_storage_buffer(_RESULT)
+        self._bind(frame, binned)
+        assert binned.counts is not None, "bins are counted"
+        for binding, buffer in ((_PIXELS, listed), (_COUNTS, binned.counts), (_RESULT, result)):
+            buffer.bind_to_storage_buffer(binding)
         set_uniforms(program, {"width": frame.width, "pixels": len(pixels)})
-        out = np.empty((len(pixels), columns), dtype=np.float32)
         for first in range(0, len(pixels), rows):
             part = out[first : first + rows]
             set_uniforms(program, {"first": first})
@@ -291,13 +221,36 @@ class KBufferDeep:
         return out
 
     @staticmethod
-    def _bind(frame: Frame, gathered: Gathered) -> None:
-        """Bind what `kbuffer-deep/inputs.glsl` reads."""
-        counts, z_min, z_max = frame.depth_range()
-        nearest = gathered.nearest_colour or z_min  # a bundle that does not read it gets any buffer
-        for binding, buffer in ((_COUNTS, counts), (_Z_MIN, z_min), (_Z_MAX, z_max), (_NEAREST, nearest)):
-            buffer.bind_to_storage_buffer(binding)
-        if gathered.front is not None:
-            gathered.front.bind_to_storage_buffer(_FRONT)
-        for unit, texture in enumerate([*gathered.sums, frame.background]):
+    def _bind(frame: Frame, binned: Binned) -> None:
+        """Bind what `kbuffer-deep/inputs.glsl` reads beside the counts."""
+        binned.bind()
+        for unit, texture in enumerate([frame.background, *binned.colours]):
             texture.use(unit)
+
+    def _draw(
+        self, frame: Frame, clock: Clock, binned: Binned, offsets: moderngl.Buffer, budget: Budget
+    ) -> moderngl.Texture:
+        """Capture cores and tail, sort, resolve."""
+        assert binned.counts is not None, "bins are counted"
+        tail = TailInputs(self._tail, binned=binned)
+        with clock.measure("capture"):
+            pool = frame.buffer(SLOT_BYTES // 4 * budget.fragments, None)
+            tails = tail_targets(frame, tail)
+            for binding, buffer in ((_OFFSETS, offsets), (_COUNTS, binned.counts), (_POOL, pool)):
+                buffer.bind_to_storage_buffer(binding)
+            frame.draw_transparent("kbuffer-deep/capture.frag", frame.target(tails), tail.defines, **tail.bind())
+            frame.ctx.memory_barrier()
+        with clock.measure("sort"):
+            program = frame.gpu.programs.compute("kbuffer-deep/sort.comp", {"BINS": self._tail.bins})
+            set_uniforms(program, {"pixels": frame.pixels})
+            run_for(program, frame.pixels)
+            frame.ctx.memory_barrier()
+        with clock.measure("resolve"):
+            return resolve_slots(frame, tail, tails, 2, self._memory, {"CURSOR": self._tail.bins // 4})
+
+    def _kept(self, frame: Frame, binned: Binned, offsets: moderngl.Buffer) -> NDArray[np.int32]:
+        """int32 [P], fragments of each pixel's core, read back."""
+        assert binned.counts is not None, "bins are counted"
+        words = np.frombuffer(binned.counts.read(binned.tail.bins * frame.pixels), dtype=np.uint32)
+        begin = np.frombuffer(offsets.read(4 * frame.pixels), dtype=np.uint32)
+        return (words.reshape(frame.pixels, -1)[:, 1].astype(np.int64) - begin).astype(np.int32)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from renderer import timing
-from renderer.allocation.fill import budget_fill, feasible_k_min
+from renderer.allocation.fill import budget_fill
 from renderer.allocation.importance import VkbOptions, vkb_importance
 from renderer.frame import Clock, Frame
 from renderer.techniques.base import Budget, Rendered
-from renderer.techniques.chain import RANGE_BYTES, render_chain, render_complete
-from schemas.tail import DENSITY_BINS
+from renderer.techniques.chain import render_chain, render_complete
+
+_FACING_BYTES = 4
+"""Of the nearest fragment."""
 
 
 class KBufferImportance:
@@ -31,16 +35,12 @@ class KBufferImportance:
         complete = render_complete(frame, n, budget)
         if complete is not None:
             return complete
-        gathered = frame.gather("gather-nearest", bins=DENSITY_BINS.get(budget.tail, 0))
-        assert gathered.nearest_facing is not None, "this gather has the nearest fragment"
+        facing_buffer = frame.gather_facing()
         clock = Clock(frame.ctx)
         with clock.measure("importance"):
             with timing.readback(frame.ctx):
-                read = np.frombuffer(gathered.nearest_facing.read(4 * frame.pixels), dtype=np.uint32)
-            facing = read.astype(np.uint8)
+                facing = np.frombuffer(facing_buffer.read(4 * frame.pixels), dtype=np.uint32).astype(np.uint8)
             weights = vkb_importance(n, facing, frame.width, frame.height, self._options)
-            slots = budget_fill(weights, n, budget.fragments, feasible_k_min(n, budget.fragments))
-        before = RANGE_BYTES + gathered.pass_bytes
-        rendered = render_chain(frame, slots, n, budget, frame.retire(gathered), before)
-        rendered.passes.update(clock.passes)
-        return rendered
+            slots = budget_fill(weights, n, budget.fragments)
+        rendered = render_chain(frame, slots, n, budget, before=_FACING_BYTES)
+        return replace(rendered, passes={**frame.passes("facing"), **clock.passes, **rendered.passes})

@@ -29,7 +29,8 @@ import numpy as np
 
 from renderer.allocation.gpu import DEFINES as ALLOCATION_DEFINES
 from renderer.allocation.gpu import FrameAllocation
-from renderer.frame import Frame, Gathered
+from renderer.bin_pass import Binned
+from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene, set_uniforms
 from renderer.programs import Defines
 from renderer.techniques.base import Budget, Rendered
@@ -66,8 +67,8 @@ DEFINES: Final[Defines] = {
 }
 """Of `kbuffer-temporal/*`."""
 
-# Storage bindings of kbuffer-temporal/correct.comp.
-_STATE, _MEMORY, _CURVES, _COUNTS = 0, 2, 5, 6
+_CURVES, _MEMORY = 2, 6
+"""Storage bindings of kbuffer-temporal/correct.comp beside the allocation's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +130,7 @@ class KBufferTemporal(KBufferDeep):
         Raises:
             Problem: There are no gain curves on the GPU.
         """
-        if self._solver == "cpu" or self.manifest.head != "gain-curve":
+        if self._network is not None or self.manifest.head != "gain-curve":
             raise Problem(
                 f"{self.name} corrects gain curves on the GPU, which this bundle or --inference does not leave there.",
                 "Use kbuffer-deep, or a bundle with gain curves and --inference glsl.",
@@ -151,14 +152,14 @@ class KBufferTemporal(KBufferDeep):
             early_bytes=rendered.early_bytes + MEMORY_BYTES,
         )
 
-    def _curves(self, frame: Frame, gathered: Gathered, allocation: FrameAllocation) -> moderngl.Buffer:
+    def _curves(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> moderngl.Buffer:
         """What the network predicts, corrected by what was seen of the last frame."""
-        curves = super()._curves(frame, gathered, allocation)
+        curves = super()._curves(frame, binned, allocation)
         assert self._memory is not None, "render is before"
-        bound = {_MEMORY: self._memory.buffer, _CURVES: curves, _COUNTS: frame.depth_range()[0]}
-        for binding, buffer in bound.items():
-            buffer.bind_to_storage_buffer(binding)
-        program = frame.gpu.programs.compute("kbuffer-temporal/correct.comp", {**ALLOCATION_DEFINES, **DEFINES})
-        set_uniforms(program, {"pixels": frame.pixels, "still": int(self._still)})
-        allocation.run_pixels(program, _STATE)
+        defines = {**ALLOCATION_DEFINES, **DEFINES, "BINS": binned.tail.bins}
+        program = frame.gpu.programs.compute("kbuffer-temporal/correct.comp", defines)
+        curves.bind_to_storage_buffer(_CURVES)
+        self._memory.buffer.bind_to_storage_buffer(_MEMORY)
+        set_uniforms(program, {"still": int(self._still)})
+        allocation.run_pixels(program)
         return curves

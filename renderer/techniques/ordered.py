@@ -2,8 +2,8 @@
 
 With `GL_ARB_fragment_shader_interlock` (`pixel_interlock_ordered`) a shader sees the fragments of a pixel in the order
 in which their triangles were submitted. Here the same order comes without it: a fragment is captured with its rank,
-the number of its triangle in the index buffer, and a pixel's run is sorted by rank. A triangle covers a pixel once,
-so ranks differ inside a pixel, and what follows is identical from run to run and from driver to driver.
+the number of its triangle in the index buffer, and a pixel's run is sorted by rank, on the GPU. A triangle covers a
+pixel once, so ranks differ inside a pixel, and what follows is identical from run to run and from driver to driver.
 """
 
 from __future__ import annotations
@@ -14,27 +14,24 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.bands import row_bands
-from renderer.csr import offsets_of, sort_fragments
+from renderer.csr import offsets_of
 from renderer.frame import Clock, Frame
 from renderer.screen import read_linear
-from renderer.techniques.bands import in_bands, rows_of
+from renderer.techniques.bands import Part, check_most, in_bands
 from renderer.techniques.base import Rendered
-from renderer.techniques.sbuffer import capture_band
+from renderer.techniques.runs import PIXEL_BYTES, Runs
 from renderer.techniques.skips import frame_skips
-from schemas.limits import LIMITS
 from schemas.problem import Problem
 
 MAX_NODES = 16
 """Nodes a pixel that the compositing shaders hold in registers. Compilers unroll loops over them; else they would count
 as turns (`renderer.screen.TURNS`)."""
 
-_CAPTURED_BYTES = 12
+NODE_BYTES = 8
+"""Of a node in both papers: RGBA8 and a depth, or a depth and a transmittance."""
+
+_WORDS = 3
 """Packed colour, depth and rank."""
-_WORD_BYTES = 4
-"""Colours and depths are two buffers for the resolve."""
-_PIXEL_BYTES = 12 + 4
-"""n, z_min, z_max of the count pass; the cursor while capturing, the offsets after it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,24 +54,22 @@ class Ordered:
 
 
 def capture_ordered(frame: Frame) -> Ordered:
-    """Every transparent fragment of a frame, in the order of submission.
+    """Every transparent fragment of a frame, in the order of submission, read back: what the shaders composite.
 
     Raises:
         Problem: One row has more fragments than a storage buffer holds.
     """
-    offsets = offsets_of(frame.count())
-    pool = np.empty((int(offsets[-1]), 3), dtype=np.uint32)
     clock = Clock(frame.ctx)
-    with clock.measure("capture"):
-        for band in row_bands(offsets, frame.width, LIMITS.buffer_bytes // _CAPTURED_BYTES):
-            capture_band(frame, "ordered/capture.frag", offsets, band, pool, ranked=True)
-    with clock.measure("sort"):
-        keys = pool[:, 2].astype(np.uint64) << np.uint64(32) | np.arange(len(pool), dtype=np.uint64)
-        sort_fragments(offsets, keys)
-        order = (keys & np.uint64(0xFFFFFFFF)).astype(np.uint32)
-        packed, depth = pool[order, 0], pool[order, 1].view(np.float32)
-    rank = (keys >> np.uint64(32)).astype(np.uint32)
-    return Ordered(offsets, packed, depth, rank, {**frame.passes("opaque", "count"), **clock.passes})
+    runs = Runs(frame, clock, _WORDS)
+    words = np.empty((runs.total, _WORDS), dtype=np.uint32)
+    for part in runs.parts():
+        pool = runs.capture(part)
+        runs.sort(part)
+        pool.read_into(words[part.base :], size=4 * _WORDS * part.items)
+        pool.release()
+    packed, depth, rank = (np.ascontiguousarray(words[:, i]) for i in range(_WORDS))
+    offsets = offsets_of(runs.read_counts())
+    return Ordered(offsets, packed, depth.view(np.float32), rank, {**frame.passes("opaque"), **clock.passes})
 
 
 def check_nodes(technique: str, nodes: int, least: int) -> int:
@@ -105,38 +100,32 @@ def render_ordered(frame: Frame, technique: str, nodes: int) -> Rendered:
 
     Returns:
         The picture. `pool_bytes` are those of the captured fragments of the whole window; above the limit of a storage
-        buffer, bands of rows use one part of that size after the other.
+        buffer, bands of rows use one part of that size after the other. `node_bytes` are what the technique would hold
+        instead with interlock.
 
     Raises:
         Problem: A pixel has more fragments than a shader can loop over, or one row more than a storage buffer holds.
     """
-    ordered = capture_ordered(frame)
     clock = Clock(frame.ctx)
+    runs = Runs(frame, clock, _WORDS)
+    check_most(runs.most)
 
-    def store(first: int, rows: int) -> list[moderngl.Buffer]:
-        with clock.measure("upload"):
-            return _upload(frame, ordered, first * frame.width, (first + rows) * frame.width)
+    def store(part: Part) -> list[moderngl.Buffer]:
+        pool = runs.capture(part)
+        runs.sort(part)
+        return [pool]
 
-    ends = rows_of(ordered.offsets, frame)
-    image = in_bands(frame, clock, ends, _WORD_BYTES, store, f"{technique}/resolve.frag", defines={"NODES": nodes})
-    k = np.minimum(np.diff(ordered.offsets), nodes).astype(np.int32)
+    defines = {"NODES": nodes, "WORDS": _WORDS}
+    image = in_bands(frame, clock, runs.tiles, runs.parts(), store, f"{technique}/resolve.frag", defines)
+    linear = read_linear(frame, image)
+    k = np.minimum(runs.read_counts(), nodes).astype(np.int32)
     return Rendered(
-        linear=read_linear(frame, image),
+        linear=linear,
         k=k,
-        passes={**ordered.passes, **clock.passes},
+        passes={**frame.passes("opaque"), **clock.passes},
         captured=int(k.sum(dtype=np.int64)),
-        pool_bytes=_CAPTURED_BYTES * len(ordered.packed),
-        pixel_bytes=_PIXEL_BYTES,
-        skips=frame_skips(frame),
+        pool_bytes=runs.pool_bytes,
+        pixel_bytes=PIXEL_BYTES,
+        node_bytes=NODE_BYTES * nodes,
+        skips=frame_skips(frame, runs.tiles),
     )
-
-
-def _upload(frame: Frame, ordered: Ordered, begin: int, end: int) -> list[moderngl.Buffer]:
-    """The runs of pixels begin..end - 1, bound; offsets count from the first of them."""
-    offsets = ordered.offsets[begin : end + 1]
-    run = slice(int(offsets[0]), int(offsets[-1]))
-    words = (offsets - offsets[0]).astype(np.uint32), ordered.depth[run], ordered.packed[run]
-    buffers = [frame.ctx.buffer(array if len(array) else np.zeros(1, np.uint32)) for array in words]
-    for binding, buffer in enumerate(buffers):
-        buffer.bind_to_storage_buffer(binding)
-    return buffers

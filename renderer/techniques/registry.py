@@ -12,6 +12,7 @@ from renderer.techniques.abuffer_array import ABufferArray
 from renderer.techniques.abuffer_list import ABufferList
 from renderer.techniques.adaptive import Adaptive
 from renderer.techniques.base import Technique
+from renderer.techniques.binned import Binned
 from renderer.techniques.depth_peeling import DepthPeeling
 from renderer.techniques.dual_depth_peeling import DualDepthPeeling
 from renderer.techniques.kbuffer import KBuffer
@@ -124,6 +125,7 @@ TECHNIQUES: Mapping[str, Entry] = {
         "bounded", "k(p) by a network and the last frame", _temporal, needs_bundle=True, settles=SETTLED
     ),
     KBufferOptimal.name: Entry("bounded", "k(p) as allocated with all fragments known", _optimal),
+    Binned.name: Entry("approximate", "a mean weighted by what depth bins know to be in front", lambda _: Binned()),
     WeightedAverage.name: Entry("approximate", "mean colour, mean opacity", lambda _: WeightedAverage()),
     WeightedBlended.name: Entry("approximate", "mean weighted by depth (McGuire)", lambda _: WeightedBlended()),
     Moment.name: Entry("approximate", "transmittance from 4 power moments (Muenstermann)", lambda _: Moment()),

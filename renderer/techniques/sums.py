@@ -31,6 +31,7 @@ def rendered(
     clock: Clock,
     pixel_bytes: int,
     pool_bytes: int = 0,
+    early_bytes: int = 0,
 ) -> Rendered:
     """The finished picture of a technique that keeps no fragment apart.
 
@@ -41,6 +42,7 @@ def rendered(
         clock: Its own passes.
         pixel_bytes: As `Rendered` has it.
         pool_bytes: As `Rendered` has it.
+        early_bytes: As `Rendered` has it.
     """
     return Rendered(
         linear=read_linear(frame, image),
@@ -49,5 +51,6 @@ def rendered(
         captured=0,
         pool_bytes=pool_bytes,
         pixel_bytes=pixel_bytes,
+        early_bytes=early_bytes,
         skips=frame_skips(frame),
     )

@@ -10,7 +10,7 @@ from renderer.techniques import TECHNIQUES
 from renderer.techniques.chain import SLOT_BYTES
 from schemas.bench import Basis, CellKey
 from schemas.bundle import MANIFEST, TailSpec, load_manifest
-from schemas.tail import DEFAULT_TAIL, TailName
+from schemas.tail import DEFAULT_TAIL, TAILS, TailKind, TailName
 from services.bench.options import BenchOptions
 from services.options import chosen_tail
 from services.store import file_sha256
@@ -71,7 +71,7 @@ def _tails(name: str, options: BenchOptions, bundle: Bundle | None) -> list[tupl
 
 def steepness(tail: TailName, g: float) -> float | None:
     """The g of a tail that has one; None for the others."""
-    return g if tail.startswith("density") else None
+    return g if TAILS[tail].kind == TailKind.DENSITY else None
 
 
 def fragments_within(total_bytes: int, pixels: int, pixel_bytes: int, early_bytes: int = 0) -> int:

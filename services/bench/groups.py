@@ -42,6 +42,7 @@ class Row:
         pool_bytes: Largest.
         total_bytes: Largest.
         pixel_bytes: Largest.
+        fits: Whether all its pools fit one storage buffer. Bytes and this also count views without a picture.
         flicker: Mean.
         flicker_k: Mean.
         problem: Why there is none, where no view has one.
@@ -69,6 +70,7 @@ class Row:
     pool_bytes: int | None
     total_bytes: int | None
     pixel_bytes: int | None
+    fits: bool
     flicker: float | None
     flicker_k: float | None
     problem: str | None
@@ -92,6 +94,11 @@ class Group:
     title: str
     views: tuple[BenchView, ...]
     rows: tuple[Row, ...]
+
+    @property
+    def depth(self) -> float:
+        """N / WH: transparent fragments a pixel, mean over the views."""
+        return mean([depth_of(view) for view in self.views]) or 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,6 +166,11 @@ def said_alpha(alpha: float | None) -> str:
     return "authored alpha" if alpha is None else f"alpha {alpha:g}"
 
 
+def depth_of(view: BenchView) -> float:
+    """N / WH: transparent fragments a pixel."""
+    return view.fragments / (view.width * view.height)
+
+
 def said_budget(key: CellKey) -> str:
     """Budget of a cell in words: `F = 2 WH`, `M of k = 2`, or nothing."""
     if key.budget_factor is None:
@@ -198,6 +210,7 @@ def _place(row: Row) -> tuple[int, float, int, str, str, str]:
 
 
 def _row(key: CellKey, found: Sequence[tuple[BenchView, BenchCell]]) -> Row:
+    every = [cell for _, cell in found]
     there = [(view, cell) for view, cell in found if cell.problem is None]
     cells = [cell for _, cell in there]
     decided = [cell for cell in cells if not cell.exact]
@@ -230,9 +243,10 @@ def _row(key: CellKey, found: Sequence[tuple[BenchView, BenchCell]]) -> Row:
         captured=_mean(cells, lambda cell: cell.captured_fragments),
         of_all=mean(shares),
         k=(min(low for low, _ in ks), max(high for _, high in ks)) if ks else None,
-        pool_bytes=_largest(cells, lambda cell: cell.pool_bytes),
-        total_bytes=_largest(cells, lambda cell: cell.total_bytes),
-        pixel_bytes=_largest(cells, lambda cell: cell.pixel_bytes),
+        pool_bytes=_largest(every, lambda cell: cell.pool_bytes),
+        total_bytes=_largest(every, lambda cell: cell.total_bytes),
+        pixel_bytes=_largest(every, lambda cell: cell.pixel_bytes),
+        fits=all(cell.fits for cell in every),
         flicker=_mean(decided, lambda cell: cell.flicker),
         flicker_k=_mean(decided, lambda cell: cell.flicker_k),
         problem=found[0][1].problem if not cells else None,

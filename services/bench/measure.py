@@ -7,7 +7,9 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from renderer.exact_bytes import exact_bytes, fits
 from renderer.techniques import TECHNIQUES, Budget, Needs, Rendered, Technique, technique
 from schemas.bench import LOSSLESS, BenchCell, CellKey, Yardstick
 from schemas.problem import ExitCode, Problem
@@ -92,7 +94,7 @@ class Bench:
         except Problem as problem:
             if problem.code != ExitCode.LIMIT:
                 raise
-            return BenchCell(**about, problem=problem.title)
+            return BenchCell(**about, **needed(key, self.subject.dump.counts), problem=problem.title)
         wrong = np.count_nonzero(~np.isfinite(rendered.linear).all(axis=2))
         if wrong:
             return BenchCell(**about, problem=f"{wrong:,} pixels of the picture are no numbers")
@@ -138,7 +140,8 @@ class Bench:
             "pool_bytes": rendered.pool_bytes,
             "pixel_bytes": rendered.pixel_bytes,
             "early_bytes": rendered.early_bytes,
-            "total_bytes": rendered.total_bytes,
+            "total_bytes": rendered.compared_bytes,
+            "fits": fits(0 if rendered.node_bytes else rendered.pool_bytes),  # nodes are emulated in a pool
             "skips": {what: int(count) for what, count in rendered.skips.items() if count},
         }
 
@@ -157,6 +160,38 @@ class Bench:
             "score_display": over(errors.mse_display, oracle.mse_display),
             "over_optimum": over(errors.mse, optimum.mse),
         }
+
+
+def needed(key: CellKey, n: NDArray[np.integer]) -> dict[str, Any]:
+    """Fields of a cell without a picture: the bytes that an exact technique would need; nothing for others.
+
+    Args:
+        key: The cell.
+        n: Transparent fragments of each pixel, int [P].
+    """
+    found = exact_bytes(key.technique, n)
+    if found is None:
+        return {}
+    return {
+        "pool_bytes": found.pool,
+        "pixel_bytes": found.pixel,
+        "total_bytes": found.total,
+        "fits": fits(found.pool),
+    }
+
+
+def without_pictures(keys: Sequence[CellKey], n: NDArray[np.integer], problem: Problem) -> list[BenchCell]:
+    """Cells of a view that has too many fragments for an exact picture: there is nothing to compare with.
+
+    Args:
+        keys: The cells.
+        n: Transparent fragments of each pixel, int [P].
+        problem: Why.
+    """
+    return [
+        BenchCell(**key.model_dump(), family=TECHNIQUES[key.technique].family, **needed(key, n), problem=problem.title)
+        for key in keys
+    ]
 
 
 def over(error: float, reference: float) -> float:

@@ -8,9 +8,19 @@ from itertools import groupby
 
 from schemas.bench import BenchResult, BenchView
 from services.bench.bars import error_bars
-from services.bench.groups import Group, Row, group, groups_of, measured, offline, said_budget, said_technique
+from services.bench.groups import (
+    Group,
+    Row,
+    group,
+    groups_of,
+    measured,
+    offline,
+    said_budget,
+    said_technique,
+)
 from services.report import charts
 from services.report.page import environment
+from services.summary import UNFIT, said_unfit
 from services.summary import Row as ChartRow
 
 
@@ -61,6 +71,8 @@ def page(result: BenchResult, plots: Sequence[str], mixed: str | None) -> str:
             offline=offline,
             said=said_technique,
             said_budget=said_budget,
+            unfit=UNFIT,
+            said_unfit=said_unfit(),
             timed=lambda rows: any(row.gpu for row in rows),
         )
     )

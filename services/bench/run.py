@@ -11,18 +11,21 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from renderer.context import describe, gl_context
 from renderer.scene import LoadOptions
 from renderer.timing import timers_are_right
 from renderer.usd.digest import scene_digest
-from schemas.bench import BenchResult, BenchView
+from schemas.bench import BenchCell, BenchResult, BenchView, CellKey, Yardstick
 from schemas.problem import ExitCode, Problem
 from schemas.scene import SceneArrays
 from schemas.view import View
 from services.bench.cells import Bundle, bundle_of, planned
 from services.bench.groups import said_alpha
 from services.bench.kept import Kept
-from services.bench.measure import Bench
+from services.bench.measure import Bench, without_pictures
 from services.bench.options import BenchOptions
 from services.bench.subject import Subject
 from services.local_scenes import LocalScene, as_usd
@@ -132,8 +135,7 @@ def _measure(
         progress.note(f"{where}: measured already")
         return
     load, start = os.getloadavg()[0], time.perf_counter()
-    n = subject.dump.counts
-    marks, cells = Bench(subject, options, bundle).measure(missing)
+    marks, cells, n = _measured(subject, options, bundle, missing)
     scene: SceneArrays = subject.gpu.scene
     view = BenchView(
         key=key,
@@ -143,7 +145,7 @@ def _measure(
         width=place.size[0],
         height=place.size[1],
         triangles=len(scene.indices) // 3,
-        fragments=subject.dump.total,
+        fragments=int(n.sum(dtype=np.int64)),
         occupied=int((n > 0).sum()),
         most=int(n.max(initial=0)),
         path_frames=options.path,
@@ -161,6 +163,20 @@ def _measure(
     kept.add(view)
     progress.note(f"{where}: {len(cells)} cells in {view.seconds:.0f} s")
     told(view)
+
+
+def _measured(
+    subject: Subject, options: BenchOptions, bundle: Bundle | None, keys: Sequence[CellKey]
+) -> tuple[list[Yardstick], list[BenchCell], NDArray[np.integer]]:
+    """Yardsticks and cells of a view, and its fragments of each pixel, int [P]."""
+    try:
+        n = subject.dump.counts
+    except Problem as problem:
+        if problem.code != ExitCode.LIMIT:
+            raise
+        counts = subject.frame().count()
+        return [], without_pictures(keys, counts, problem), counts
+    return *Bench(subject, options, bundle).measure(keys), n
 
 
 def _key(place: _Place, options: BenchOptions) -> str:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from services.bench.groups import Group, Row, offline, said_budget, said_technique
 from services.cli.lines import print_columns, size
-from services.summary import MSE_FLOOR, number
+from services.summary import MSE_FLOOR, UNFIT, number, said_unfit
 
 
 def show(shown: Group) -> None:
     """Print the views of a group: techniques, offline allocations, and the time of each pass."""
-    print(f"\n{shown.title}: {len(shown.views)} view{'s' if len(shown.views) > 1 else ''}")
+    count = f"{len(shown.views)} view{'s' if len(shown.views) > 1 else ''}"
+    print(f"\n{shown.title}: {count}, N = {shown.depth:.1f} WH")
     with_path = any(row.flicker is not None for row in shown.rows)
     headings = ("technique", "budget", "ms", "MSE e-5", "linear e-5", "occupied e-5", "q", "/ optimum")
     headings += ("PSNR", "SSIM", "FLIP", "captured", "k", "pool", "total", *(("flicker e-3",) if with_path else ()))
@@ -17,6 +18,8 @@ def show(shown: Group) -> None:
         headings,
         [[said_technique(row.key), said_budget(row.key), *_cells(row, with_path)] for row in shown.rows],
     )
+    if not all(row.fits for row in shown.rows):
+        print(f"{UNFIT} {said_unfit()}")
     if marks := offline(shown):
         print()
         print_columns(
@@ -46,7 +49,8 @@ def show(shown: Group) -> None:
 
 def _cells(row: Row, with_path: bool) -> list[str | None]:
     if row.problem is not None:
-        return ["no room" if row.key.basis == "memory" else row.problem, *[None] * (12 + with_path)]
+        said = "no room" if row.key.basis == "memory" else row.problem
+        return [said, *[None] * 10, *_bytes(row), *[None] * with_path]
     spread = f" ±{50.0 * row.spread:.0f} %" if row.spread else ""
     time = None if row.ms is None else f"{row.ms:.1f}{spread}"
     errors = [_e5(row.mse), _e5(row.mse_linear), _e5(row.mse_occupied), number(row.score), number(row.over_optimum)]
@@ -63,10 +67,18 @@ def _cells(row: Row, with_path: bool) -> list[str | None]:
         None if row.flip is None else f"{row.flip:.4f}",
         kept,
         None if kept is None or row.k is None else f"{row.k[0]}..{row.k[1]}",
-        None if row.pool_bytes is None else size(row.pool_bytes),
-        None if row.total_bytes is None else size(row.total_bytes),
+        *_bytes(row),
         *([None if row.flicker is None else number(1e3 * row.flicker)] if with_path else []),
     ]
+
+
+def _bytes(row: Row) -> tuple[str | None, str | None]:
+    """Pool and total."""
+    mark = "" if row.fits else f" {UNFIT}"
+    return (
+        None if row.pool_bytes is None else size(row.pool_bytes) + mark,
+        None if row.total_bytes is None else size(row.total_bytes),
+    )
 
 
 def _e5(error: float | None) -> str | None:

@@ -10,7 +10,7 @@ import typer
 
 from schemas.network import DEFAULT_NETWORK
 from schemas.pixel_weights import DEFAULT_WEIGHTS, WEIGHTS_HELP
-from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAIL_HELP
+from schemas.tail import BUNDLE_TAIL_HELP, DEFAULT_TAIL, DENSITY_G
 from services.cli import output
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
 
@@ -35,7 +35,7 @@ def build(
         int, typer.Option("--views-per-scene", help="Views sampled of a scene that has no cameras.")
     ] = 3,
     size: Annotated[str, typer.Option("--size", help="Width and height of the pictures, pixels.")] = "1430x960",
-    tail: Annotated[str, typer.Option("--tail", help=TAIL_HELP)] = DEFAULT_TAIL,
+    tail: Annotated[str, typer.Option("--tail", help=BUNDLE_TAIL_HELP)] = DEFAULT_TAIL,
     g: Annotated[float, typer.Option("--g", help="Steepness of the density tail.")] = DENSITY_G,
     seed: Annotated[int, typer.Option("--seed", help="Seed of everything drawn at random.")] = 0,
     steps: Annotated[int | None, typer.Option("--steps", help="Optimiser steps. Default: the trainer's.")] = None,

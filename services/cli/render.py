@@ -140,6 +140,8 @@ def _show(picture: Picture) -> None:
     print(f"  view {picture.view} ({picture.view_how}), {frame}")
     if picture.problem is not None or picture.passes is None or picture.k is None:
         print(f"  left out: {picture.problem}")
+        if picture.total_bytes is not None:
+            print(f"  it would need {_memory(picture)}")
         return
     pixels = picture.width * picture.height
     least, most = picture.k
@@ -149,10 +151,18 @@ def _show(picture: Picture) -> None:
         print(f"  budget {picture.budget:,} fragments, {picture.tail} tail")
     total = sum(picture.passes.values())
     print(f"  {total:.1f} ms: {', '.join(f'{name} {ms:.1f}' for name, ms in picture.passes.items())}")
-    memory = f"pool {size(picture.pool_bytes or 0)}, {picture.pixel_bytes} bytes a pixel beside it"
-    print(f"  memory: {memory}, {size(picture.total_bytes or 0)} at most")
+    print(f"  memory: {_memory(picture)}")
     if picture.skips:
         print(f"  skipped: {', '.join(f'{count:,} {what}' for what, count in picture.skips.items())}")
     if picture.mse is not None:
         psnr = "no error" if picture.psnr is None else f"PSNR {picture.psnr:.2f} dB"
         print(f"  against exact: MSE {1e5 * picture.mse:.4g} x1e-5, {psnr}, FLIP {picture.flip:.4g}")
+
+
+def _memory(picture: Picture) -> str:
+    from services.summary import said_unfit
+
+    pool = f"pool {size(picture.pool_bytes or 0)}"
+    if not picture.fits:
+        pool += f" (it {said_unfit()})"
+    return f"{pool}, {picture.pixel_bytes} bytes a pixel beside it, {size(picture.total_bytes or 0)} at most"

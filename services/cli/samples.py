@@ -1,4 +1,4 @@
-"""`diaphane samples`: the project's own small scenes."""
+"""`diaphane samples`: the project's own scenes."""
 
 from __future__ import annotations
 
@@ -13,12 +13,16 @@ from services.cli.state import JsonOption
 
 def samples(
     folder: Annotated[Path, typer.Argument(help="Where the USD files go; created if missing.")],
+    deep: Annotated[
+        bool, typer.Option("--deep", help="Write the deep scenes instead: 8 to 100 transparent fragments a pixel.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Write small USD scenes of different kinds, to try `diaphane build` on."""
-    from renderer.samples import write_samples
+    from renderer.samples import SAMPLES, write_samples
+    from renderer.samples.deep import DEEP
 
-    paths = write_samples(folder)
+    paths = write_samples(folder, DEEP if deep else SAMPLES)
     if as_json:
         output.print_json({"scenes": [str(path) for path in paths]})
         return

@@ -48,7 +48,6 @@ def _description(task: Task, trained: Facts, views: int) -> Description:
         name=params["name"],
         tail=TailSpec(name=settings["tail"], g=settings["g"]),
         metric=METRIC,
-        k_min=1,
         provenance=Provenance(
             scenes=params["scenes"],
             holdout=params["holdout"],

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from labeller.allocation import RULES, Allocation
-from labeller.curves import error_curves
+from labeller.curves import error_curves, whole_bins
 from labeller.flip_weights import flip_weights
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
@@ -27,7 +27,7 @@ def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
     params = task.params
     dump = read_dump(desk.artifact(task, "render"))
     curves = error_curves(dump, params["tail"], params["g"], params["metric"])
-    hulls = lower_hulls(curves, 1)
+    hulls = lower_hulls(curves)
     report(0.3, f"curves of {dump.total:,} fragments")
     budgets = needed_budgets(params["budgets"], dump.total)
     made = {rule: allocate_curves(dump, curves, budgets, rule, hulls=hulls) for rule in RULES}
@@ -38,8 +38,8 @@ def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
         # What is compared with other rules is not weighted; what is learned is.
         counted = flip_weights(dump, [found.k for found in made["optimal"]], params["tail"], params["g"])
         curves = error_curves(dump, params["tail"], params["g"], params["metric"], counted)
-    taught = hulls if weights == DEFAULT_WEIGHTS else lower_hulls(curves, 1)
-    written = write_shard(folder / SHARD, dump, curves, taught, budgets, seed=params["seed"], weights=weights)
+    cuts = whole_bins(dump, curves)
+    written = write_shard(folder / SHARD, dump, cuts, lower_hulls(cuts), budgets, seed=params["seed"], weights=weights)
     facts = {
         "errors": {rule: _answers(params["budgets"], allocations, _error, 0.0) for rule, allocations in made.items()},
         "certificates": _answers(params["budgets"], made["optimal"], _certificate, _EXACT),

@@ -31,7 +31,7 @@ _SOURCES: Mapping[StageName, tuple[str, ...]] = {
         "schemas.fragments",
         *(f"renderer.{name}" for name in ("capture", "csr", "culling", "dump", "fragment_list")),
         *(f"renderer.{name}" for name in ("frame", "gpu_scene", "programs")),
-        *(f"renderer.shaders.{name}" for name in ("common", "opaque", "count", "gather", "capture")),
+        *(f"renderer.shaders.{name}" for name in ("common", "opaque", "count", "range", "gather", "capture")),
         "services.stages.render",
     ),
     "label": (

@@ -19,7 +19,7 @@ from labeller.rules import allocate_curves
 from labeller.selection import END, Histogram, ascending_keys
 from labeller.streaming import allocate_bands
 from schemas.fragments import FragmentDump
-from schemas.tail import TAILS
+from schemas.tail import RANGE_TILE, TAIL_NAMES
 from services.stress.bounds import PIXEL_FLOOR, counted, within
 from services.stress.cases import Case, curve_cases, dump_of, random_dump, some_list
 from services.stress.findings import Finding, Options, worst_of
@@ -30,10 +30,10 @@ _EXACT: Final = 64  # hulls of longer lists are not made in rational arithmetic
 _SMALL: Final = 40  # fragments up to which a full search is made
 _LITERAL: Final = 4096  # fragments up to which the literal heap is run
 _TRIED: Final = {
-    "hull": "every k, k_min 0 and 1",
-    "hull.slopes": "k_min 0 and 1",
-    "greedy": "every F, k_min 0 and 1",
-    "increment": "every F, k_min 0 and 1",
+    "hull": "every k",
+    "hull.slopes": "every k",
+    "greedy": "every F",
+    "increment": "every F",
     "limits": "every rule, every F",
     "optimal.greedy": "every F",
 }
@@ -115,19 +115,18 @@ def _hulls(name: str, curves: Curves) -> Iterator[Finding]:
     truth: list[float] = []
     places: list[str] = []
     rising = 0
-    for k_min in (0, 1):
-        hulls = lower_hulls(curves, k_min)
-        slopes, _ = hulls.steps()
-        for p, curve in enumerate(_split(curves)):
-            part = slice(hulls.offsets[p], hulls.offsets[p + 1])
-            rising += int((np.diff(slopes[part]) > 0.0).sum())
-            if len(curve) > _EXACT or len(curve) - 1 <= k_min or curve[k_min] == 0.0:
-                continue
-            exact = exact_hull(curve, k_min)
-            k = np.arange(k_min, k_min + len(exact))
-            found += np.interp(k, hulls.k[part], hulls.error[part].astype(np.float64)).tolist()
-            truth += [float(x) for x in exact]
-            places += [f"k_min {k_min}, pixel {p}, k {i}" for i in k]
+    hulls = lower_hulls(curves)
+    slopes, _ = hulls.steps()
+    for p, curve in enumerate(_split(curves)):
+        part = slice(hulls.offsets[p], hulls.offsets[p + 1])
+        rising += int((np.diff(slopes[part]) > 0.0).sum())
+        if len(curve) > _EXACT or curve[0] == 0.0:
+            continue
+        exact = exact_hull(curve)
+        k = np.arange(len(exact))
+        found += np.interp(k, hulls.k[part], hulls.error[part].astype(np.float64)).tolist()
+        truth += [float(x) for x in exact]
+        places += [f"pixel {p}, k {i}" for i in k]
     yield counted("hull.slopes", name, rising)
     if found:
         yield within("hull", name, np.array(found), np.array(truth), places)
@@ -163,12 +162,10 @@ def _heaps(name: str, dump: FragmentDump, curves: Curves) -> Iterator[Finding]:
     split = _split(curves)
     for path, key in _HEAPS:
         differ, where = 0, ""
-        for k_min in (0, 1):
-            for found in allocate_curves(dump, curves, edge_budgets(dump.counts), path, k_min=k_min):
-                literal = reference.heap_removal(split, found.budget, found.k_min, key)
-                wrong = np.flatnonzero(found.k != literal)
-                if len(wrong):
-                    differ, where = differ + len(wrong), f"F {found.budget}, k_min {k_min}, pixel {wrong[0]}"
+        for found in allocate_curves(dump, curves, edge_budgets(dump.counts), path):
+            wrong = np.flatnonzero(found.k != reference.heap_removal(split, found.budget, key))
+            if len(wrong):
+                differ, where = differ + len(wrong), f"F {found.budget}, pixel {wrong[0]}"
         yield counted(path, name, differ, where)
 
 
@@ -177,8 +174,7 @@ def _limits(name: str, dump: FragmentDump, curves: Curves) -> Finding:
     n, broken, where = dump.counts, 0, ""
     for rule in RULES:
         for found in allocate_curves(dump, curves, edge_budgets(n), rule):
-            least = 0 if rule in ("fixed", "dynamic") else np.minimum(n, found.k_min)
-            count = int(((found.k < least) | (found.k > n)).sum())
+            count = int(((found.k < 0) | (found.k > n)).sum())
             count += max(int(found.k.sum()) - found.budget, 0) + int(found.used != found.k.sum())
             count += int(not np.isfinite(found.error) or found.error < 0.0)
             if count:
@@ -202,20 +198,21 @@ def _never_above(name: str, dump: FragmentDump, curves: Curves) -> Finding:
 def _bands(options: Options) -> Iterator[Finding]:
     """Row bands one after the other against the whole view, for every rule that can be computed so."""
     rng = np.random.default_rng(options.seed)
-    height, width = (12, 20) if options.quick else (48, 64)
+    height, width = (20, 20) if options.quick else (48, 64)
+    bands = (RANGE_TILE, 2 * RANGE_TILE, height)  # whole tiles: depth bins lie between the ends of a tile's range
     for name, ties in (("random view", False), ("depth ties across an image", True)):
         dump = replace(random_dump(rng, height * width, 9, ties), width=width, height=height)
         curves, budgets = error_curves(dump), edge_budgets(dump.counts)
         wrong, where = 0, ""
         for rule in _BY_ERROR:
-            for rows in (1, 5, height):
+            for rows in bands:
                 parts = [_rows_of(dump, first, min(first + rows, height)) for first in range(0, height, rows)]
                 whole = allocate_curves(dump, curves, budgets, rule)
                 for one, other in zip(allocate_bands(partial(list, parts), budgets, rule), whole, strict=True):
                     differ = int((one.k != other.k).sum())
                     if differ:
                         wrong, where = wrong + differ, f"{rule}, {rows} rows a band, F {one.budget}"
-        yield counted("bands", f"{name}, bands of 1, 5 and {height} rows, every F", wrong, where)
+        yield counted("bands", f"{name}, bands of {bands[0]}, {bands[1]} and {height} rows, every F", wrong, where)
 
 
 def _rows_of(dump: FragmentDump, first: int, last: int) -> FragmentDump:
@@ -257,9 +254,9 @@ def _searched(rng: np.random.Generator, tries: int, ties: bool) -> Iterator[tupl
     """Allocations of small views with the true optimum, and which they are."""
     for trial in range(tries):
         dump = random_dump(rng, int(rng.integers(1, 7)), _SMALL // 6, ties)
-        curves = error_curves(dump, TAILS[trial % len(TAILS)])
+        curves = error_curves(dump, TAIL_NAMES[trial % len(TAIL_NAMES)])
         for found in allocate_curves(dump, curves, edge_budgets(dump.counts), "optimal"):
-            optimum = reference.optimum(_split(curves), found.budget, found.k_min)
+            optimum = reference.optimum(_split(curves), found.budget)
             yield found, optimum, f"view {trial}, F {found.budget}"
 
 
@@ -269,11 +266,11 @@ def _far_away() -> Iterator[tuple[Allocation, float, str]]:
     curves = _curves([*pairs, np.array([9.0, 0.9, 0.0])])
     budgets = [len(curves.counts) + fragments for fragments in (1, 401, 601, 801)]
     for found in allocate_curves(_dump_for(curves), curves, budgets, "optimal"):
-        yield found, reference.optimum(_split(curves), found.budget, found.k_min), f"F {found.budget}"
+        yield found, reference.optimum(_split(curves), found.budget), f"F {found.budget}"
 
 
 def _rising(options: Options) -> Iterator[Finding]:
-    """The error of `optimal` over rising budgets of one k_min."""
+    """The error of `optimal` over rising budgets."""
     rng = np.random.default_rng(options.seed)
     pixels = 400 if options.quick else 4000
     for case in (
@@ -282,8 +279,7 @@ def _rising(options: Options) -> Iterator[Finding]:
         Case("lists of 0 to 60", dump_of([some_list(rng, int(rng.integers(0, 61))) for _ in range(pixels // 8)])),
     ):
         curves = error_curves(case.dump)
-        occupied = int(np.count_nonzero(case.dump.counts))
-        budgets = np.linspace(occupied, case.dump.total, 40).astype(int).tolist()
+        budgets = np.linspace(0, case.dump.total, 40).astype(int).tolist()
         found: list[Allocation] = allocate_curves(case.dump, curves, budgets, "optimal")
         errors = np.array([x.error for x in found])
         least = np.minimum.accumulate(errors)

@@ -62,8 +62,8 @@ BOUNDS: Final[dict[str, Bound]] = {
         1e-11,
         "relative",
         1.0,
-        "Optical depths in front of fragments, as the depth bins of `density-16` and `density-8` tell them, up to the "
-        "60 where weights end. The operations are the same, in float64; should a compiler fuse some, each is a "
+        "Optical depths in front of fragments, as the depth bins of the binned tails tell them, up to the 60 where "
+        "weights end. The operations are the same, in float64; should a compiler fuse some, each is a "
         "rounding of `D`, at most 22,700 x 2^-53 = 2.5e-12 for 4096 fragments of 254/255.",
     ),
     "csr": Bound(0.0, "absolute", 1.0, "Sorting moves bits: fragments in another place than a stable sort puts them."),
@@ -79,7 +79,7 @@ BOUNDS: Final[dict[str, Bound]] = {
     "greedy": Bound(0.0, "absolute", 1.0, "Pixels whose k differs from the literal heap's, ties included."),
     "increment": Bound(0.0, "absolute", 1.0, "Pixels whose k differs from the literal heap's, ties included."),
     "limits": Bound(
-        0.0, "absolute", 1.0, "Pixels outside of `k_min <= K <= n`, fragments above F, errors that are not finite."
+        0.0, "absolute", 1.0, "Pixels outside of `0 <= K <= n`, fragments above F, errors that are not finite."
     ),
     "bands": Bound(0.0, "absolute", 1.0, "Pixels whose k differs where the view comes in row bands."),
     "optimal.greedy": Bound(
@@ -99,7 +99,13 @@ BOUNDS: Final[dict[str, Bound]] = {
         "By how much the error of `optimal` rises with F. It is optimal up to its certificate only, so it may by "
         "the gap, and no more than the gap's own limit. The floor is per pixel.",
     ),
-    "fill.limits": Bound(0.0, "absolute", 1.0, "Fragments that a fill misses F by, pixels outside of `[k_min, n]`."),
+    "fill.limits": Bound(
+        0.0,
+        "absolute",
+        1.0,
+        "Fragments that a fill misses F by, pixels outside of `[0, n]`. Of cuts: fragments above F, cores that are not "
+        "whole bins, bins of a pixel that come next and would fit.",
+    ),
     "fill.budget": Bound(
         1e-12,
         "relative",
@@ -110,12 +116,12 @@ BOUNDS: Final[dict[str, Bound]] = {
     "fill.lambda": Bound(
         1e-12, "relative", 1.0, "The same with `t = -log lambda`; relative to the largest `|a| + n b` of the view."
     ),
-    "fill.lattice": Bound(
+    "fill.cuts": Bound(
         2.5e-4,
         "relative",
         1.0,
-        "The same for the float32 form on a lattice of prices, which the compute passes share: prices near t are "
-        "2^-13 (1 + |t|) apart, and what grows between two of them is handed out by pixel index.",
+        "The same for whole bins, in float32 as the compute passes have it: a price is known by 22 bits, so that "
+        "prices up to 2^-13 |t| apart have the same rank, and what comes at the last one is handed out by pixel index.",
     ),
     "fill.order": Bound(
         0.0,
@@ -141,25 +147,33 @@ BOUNDS: Final[dict[str, Bound]] = {
         1e-7, "relative", 1e-30, "Sums in float64, rounded to float32 once: 2^-24 = 6e-8. The floor only excludes 0."
     ),
     "features.derive": Bound(
-        1e-6,
+        3e-6,
         "relative",
         1.0,
         "All features but the spreads, in float32 as in a shader, against float64 from the fragments on. The "
-        "covariances are differences of numbers up to 1, so they are right absolutely, not relatively.",
+        "covariance is a difference of numbers up to 1, or 5 where bins are full, so it is right absolutely, not "
+        "relatively.",
+    ),
+    "features.place": Bound(
+        5e-7,
+        "relative",
+        1e-12,
+        "Sums of places along the tile's range: each has five roundings to float32, so that it is the same in shaders. "
+        "The floor is above the root of the least float32.",
     ),
     "features.spread": Bound(
-        1e-3,
+        1e-5,
         "absolute",
         1.0,
-        "Standard deviations, `sqrt(E[x^2] - E[x]^2)`: where values are nearly equal the difference is the rounding "
-        "of both, and the root makes 4e-4 of 2^-24 and more. The weakest bound here.",
+        "Standard deviations, `sqrt(max(1e-3, E[x^2] - E[x]^2))`: the difference is right to 2e-7, and the root makes "
+        "16 times that of it at the least. The weakest bound here.",
     ),
-    "features.front": Bound(
+    "features.kept": Bound(
         0.0,
         "absolute",
         1.0,
-        "`front_1` to `front_15`: shares of the optical depth in front of depth bins that are another fifteenth than "
-        "in integer arithmetic. Bins are found by float32 operations that are the same everywhere, and count integers.",
+        "`front_b` and `mean_b` of every binned tail that are another step than in integer arithmetic. Bins are found "
+        "by float32 operations that are the same everywhere, and count integers.",
     ),
     "features.float16": Bound(
         INFORMATION,

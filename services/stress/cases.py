@@ -132,7 +132,7 @@ def curve_cases(quick: bool, seed: int) -> list[Case]:
 
 
 def bin_cases() -> list[Case]:
-    """What is hard for the depth bins of the binned density tails, 8 and 16: their edges, ties of shares, full bins."""
+    """What is hard for depth bins, 8 and 16: their edges, ties of shares, full bins."""
     edge = np.arange(17) / 16.0
     # x of `y = p x + r sqrt(x)`, by the quadratic formula in sqrt(x).
     x = ((np.sqrt(ROOT_SHARE**2 + 4.0 * PLAIN_SHARE * edge) - ROOT_SHARE) / (2.0 * PLAIN_SHARE)) ** 2
@@ -201,7 +201,7 @@ FOUND: Final[tuple[tuple[str, str, tuple[float, ...], tuple[int, int, int]], ...
         (20, 1, 0),
     ),
     # hypothesis found 5 equal fragments, a search of all levels and counts then these: the mean of equal numbers is not
-    # the number, and the root of the difference is the worst standard deviation of all.
+    # the number, so that the difference of squares is nothing but rounding.
     ("found: 89 equal fragments", "e3e3e3fe" * 89, (2.0,) * 89, (0, 0, 0)),
 )
 """Name, stored RGBA as hex, depths, stored background."""

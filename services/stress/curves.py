@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from labeller import reference
 from labeller.curves import composite, error_curves, error_curves_by_g
 from renderer.csr import bin_fragments, sort_fragments
-from renderer.depth_bins import OPTICAL, binned_exponents
+from renderer.depth_bins import OPTICAL, bin_form, binned_exponents, kept_room
+from renderer.tile_range import pixel_ranges
 from schemas.colour import linear_to_srgb
 from schemas.fragments import FragmentDump
-from schemas.tail import DEFAULT_TAIL, DENSITY_BINS, DENSITY_G, MAX_EXPONENT, METRICS, TAILS, MetricName, TailName
+from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, DENSITY_G, MAX_EXPONENT, METRICS, TAILS, MetricName, TailName
 from services.stress.bounds import counted, within
 from services.stress.cases import LONGEST, Case, curve_cases, dump_of
 from services.stress.findings import Finding, Options, worst_of
@@ -49,7 +50,7 @@ def run(options: Options) -> Iterator[Finding]:
     yield worst_of([_weighted(case) for case in cases], f"{len(cases)} inputs, weights 1e-9 to 1e9")
     yield worst_of([_by_g(case) for case in cases], f"{len(cases)} inputs, g of {', '.join(f'{g:g}' for g in _GS)}")
     yield worst_of([picture_finding(case) for case in cases], f"{len(cases)} inputs, every tail")
-    for tail in DENSITY_BINS:
+    for tail in BINNED_TAILS:
         yield worst_of([_exponents(case, tail) for case in cases], f"{len(cases)} inputs, {tail}")
     yield from _reference(options)
     yield from _transmittance()
@@ -91,15 +92,13 @@ def _by_g(case: Case) -> Finding:
 
 def _exponents(case: Case, tail: TailName) -> Finding:
     """Optical depths in front of fragments that depth bins tell, up to where weights end."""
-    found, truth, names = [], [], []
-    for p in range(case.dump.pixels):
+    found, truth, names, ranges = [], [], [], pixel_ranges(case.dump)
+    for p in np.flatnonzero(case.dump.counts).tolist():
         part = slice(case.dump.offsets[p], case.dump.offsets[p + 1])
         depth, rgba = case.dump.depth[part], case.dump.rgba[part]
-        if len(depth) == 0:
-            continue
-        optical, made = OPTICAL[rgba[:, 3]], np.empty(len(depth))
-        binned_exponents(depth, rgba, float(optical.sum()), np.empty(DENSITY_BINS[tail] + 1), made)
-        expected = reference.binned_exponents(depth.astype(np.float64), optical, DENSITY_BINS[tail])
+        made, place = np.empty(len(depth)), (ranges.nearest[p], ranges.extent[p])
+        binned_exponents(bin_form(TAILS[tail]), depth, rgba, *place, kept_room(), made)
+        expected = reference.binned_exponents(reference.pixel_of(case.dump, p), OPTICAL[rgba[:, 3]], TAILS[tail])
         found += np.minimum(made, MAX_EXPONENT).tolist()
         truth += np.minimum(expected, MAX_EXPONENT).tolist()
         names += [f"{tail}, pixel {p}, fragment {i}" for i in range(len(depth))]

@@ -1,4 +1,4 @@
-"""Fills of a budget against sorted float64 thresholds, and sums of 1e7 importances in every order."""
+"""Fills of a budget and cuts at whole bins against float64 thresholds; sums of 1e7 importances in every order."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from labeller.curves import Curves
-from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
-from renderer.allocation.lattice import curves_of, solve_on_lattice
+from renderer.allocation.cuts import FULL, MOST_CORE, Cuts, Events, events_of, solve_cuts, within_limits
+from renderer.allocation.fill import budget_fill, solve_lambda
 from schemas.tail import DENSITY_G
 from services.stress.allocations import edge_budgets
 from services.stress.bounds import counted, within
@@ -23,27 +23,21 @@ Numbers = NDArray[np.float32]
 
 
 def run(options: Options) -> Iterator[Finding]:
-    """Both fills at every edge budget, then the sums."""
+    """Both fills and whole bins at every edge budget, then the sums."""
     rng = np.random.default_rng(options.seed)
     pixels = 300 if options.quick else 2000
     n = np.where(rng.random(pixels) < 0.02, 4096, rng.integers(0, 7, pixels)).astype(np.int32)
     limits = []
     for name, weights in weight_cases(rng, pixels).items():
-        found = [(f, budget_fill(weights, n, f, feasible_k_min(n, f))) for f in edge_budgets(n)]
+        found = [(f, budget_fill(weights, n, f)) for f in edge_budgets(n)]
         limits.append(_limits(f"weights {name}", n, found))
         yield _order_of_weights(name, n, weights, found)
     for name, (a, b) in gain_cases(rng, pixels).items():
-        found = [(f, solve_lambda(a, b, n, f, feasible_k_min(n, f))[0]) for f in edge_budgets(n)]
+        found = [(f, solve_lambda(a, b, n, f)[0]) for f in edge_budgets(n)]
         limits.append(_limits(f"gains {name}", n, found))
-        yield _order_of_gains("fill.lambda", name, n, a, b, found)
-        curves = curves_of(a, b)
-        found = [(f, solve_on_lattice(curves, n, f).k) for f in edge_budgets(n)]
-        limits.append(_limits(f"gains {name} on the lattice", n, found))
-        yield _order_of_gains("fill.lattice", name, n, a, b, found)
-    for name, (a, b) in overflow_cases(rng, pixels).items():
-        found = [(f, solve_on_lattice(curves_of(a, b), n, f).k) for f in edge_budgets(n)]
-        limits.append(_limits(f"gains {name} on the lattice", n, found))
+        yield _order_of_gains(name, n, a, b, found)
     yield worst_of(limits, f"{len(limits)} inputs, every F")
+    yield from _whole_bins(rng, pixels)
     yield from _sums(rng, 100_000 if options.quick else 10_000_000)
 
 
@@ -92,8 +86,7 @@ def overflow_cases(rng: np.random.Generator, pixels: int) -> dict[str, tuple[Num
 def _limits(name: str, n: Counts, found: list[tuple[int, Counts]]) -> Finding:
     wrong, where = 0, ""
     for budget, k in found:
-        least = np.minimum(n, feasible_k_min(n, budget))
-        count = abs(int(k.sum()) - min(budget, int(n.sum()))) + int(((k < least) | (k > n)).sum())
+        count = abs(int(k.sum()) - min(budget, int(n.sum()))) + int(((k < 0) | (k > n)).sum())
         if count:
             wrong, where = wrong + count, f"F {budget}"
     return counted("fill.limits", name, wrong, where)
@@ -104,9 +97,8 @@ def _order_of_weights(name: str, n: Counts, weights: Numbers, found: list[tuple[
     w = weights.astype(np.float64)
     late, places = [], []
     for budget, k in found:
-        least = np.minimum(n, feasible_k_min(n, budget))
         with np.errstate(divide="ignore"):
-            given, missing = (k > least) & (w > 0.0), (k < n) & (w > 0.0)
+            given, missing = (k > 0) & (w > 0.0), (k < n) & (w > 0.0)
             last = (k[given] / w[given]).max(initial=0.0)
             first = ((k[missing] + 1) / w[missing]).min(initial=math.inf)
         late.append(max(last / first - 1.0, 0.0) if math.isfinite(first) else 0.0)
@@ -114,21 +106,81 @@ def _order_of_weights(name: str, n: Counts, weights: Numbers, found: list[tuple[
     return within("fill.budget", name, np.array(late), np.zeros(len(late)), places)
 
 
-def _order_of_gains(
-    path: str, name: str, n: Counts, a: Numbers, b: Numbers, found: list[tuple[int, Counts]]
-) -> Finding:
+def _order_of_gains(name: str, n: Counts, a: Numbers, b: Numbers, found: list[tuple[int, Counts]]) -> Finding:
     """A pixel's j-th fragment comes at the price `a - (j - 1.5) b`: what was given must not be below what was not."""
     gain, decay = a.astype(np.float64), b.astype(np.float64)
     late, places = [], []
     for budget, k in found:
-        least = np.minimum(n, feasible_k_min(n, budget))
-        given, missing = k > least, k < n
+        given, missing = k > 0, k < n
         lowest = (gain - (k - 1.5) * decay)[given].min(initial=math.inf)
         highest = (gain - (k - 0.5) * decay)[missing].max(initial=-math.inf)
         scale = float((np.abs(gain) + n * decay).max())
         late.append(max((highest - lowest) / scale, 0.0))
         places.append(f"F {budget}")
-    return within(path, name, np.array(late), np.zeros(len(late)), places)
+    return within("fill.lambda", name, np.array(late), np.zeros(len(late)), places)
+
+
+def _whole_bins(rng: np.random.Generator, pixels: int) -> Iterator[Finding]:
+    """Cuts at every edge budget: limits, and the order in which bins are granted."""
+    counts = bin_counts(rng, pixels)
+    n, limits = whole_bins(counts), []
+    for name, (a, b) in (gain_cases(rng, pixels) | overflow_cases(rng, pixels)).items():
+        events = events_of(a, b, counts)
+        found = [(f, solve_cuts(events, f)) for f in edge_budgets(n.sum(axis=1))]
+        limits.append(_cut_limits(name, n, events, found))
+        yield _order_of_bins(name, n, *within_limits(a, b), found)
+    yield worst_of(limits, f"{len(limits)} inputs, every F")
+
+
+def bin_counts(rng: np.random.Generator, pixels: int, bins: int = 12) -> NDArray[np.uint8]:
+    """Fragments of every bin, uint8 [P, bins]: few or none, as many as a count holds, more than a core may have."""
+    few = np.where(rng.random((pixels, bins)) < 0.6, 0, rng.integers(0, 7, (pixels, bins)))
+    many = rng.choice([0, 1, 200, FULL - 1, FULL], (pixels, bins))
+    return np.where(rng.random((pixels, 1)) < 0.1, many, few).astype(np.uint8)
+
+
+def whole_bins(counts: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """int64 [P, B], fragments of bins that can be in a core, in plain Python; 0 from the first one that cannot."""
+    usable = np.zeros(counts.shape, np.int64)
+    for row, out in zip(counts.tolist(), usable, strict=True):
+        total = 0
+        for b, own in enumerate(row):
+            total += own
+            if own == FULL or total > MOST_CORE:
+                break
+            out[b] = own
+    return usable
+
+
+def _cut_limits(name: str, n: NDArray[np.int64], events: Events, found: list[tuple[int, Cuts]]) -> Finding:
+    """Fragments above F, cores that are not whole bins, and what is left where the next pixel's bins would fit."""
+    wrong, where = 0, ""
+    for budget, cuts in found:
+        inside = np.arange(n.shape[1]) < cuts.cut[:, None]
+        left = budget - int(cuts.k.sum())
+        count = max(-left, 0) + int((cuts.k != (n * inside).sum(axis=1)).sum())
+        waiting = (n > 0) & ~inside
+        if waiting.any():
+            rank = events.rank[waiting].min()
+            count += int(left >= (n * (waiting & (events.rank == rank))).sum(axis=1).max())
+        if count:
+            wrong, where = wrong + count, f"F {budget}"
+    return counted("fill.limits", f"cuts, gains {name}", wrong, where)
+
+
+def _order_of_bins(name: str, n: NDArray[np.int64], a: Numbers, b: Numbers, found: list[tuple[int, Cuts]]) -> Finding:
+    """A bin comes at the price where the middle of its fragments does: none that was given above one that was not."""
+    gain, fall, after = a.astype(np.float64)[:, None], b.astype(np.float64)[:, None], np.cumsum(n, axis=1)
+    price = fall * (after - n / 2.0 - 1.0) - gain
+    scale = float((np.abs(gain) + after * fall).max())
+    late, places = [], []
+    for budget, cuts in found:
+        inside = np.arange(n.shape[1]) < cuts.cut[:, None]
+        highest = price[inside & (n > 0)].max(initial=-math.inf)
+        lowest = price[~inside & (n > 0)].min(initial=math.inf)
+        late.append(max((highest - lowest) / scale, 0.0))
+        places.append(f"F {budget}")
+    return within("fill.cuts", name, np.array(late), np.zeros(len(late)), places)
 
 
 def _sums(rng: np.random.Generator, count: int) -> Iterator[Finding]:
@@ -175,12 +227,12 @@ def _fill_in_any_order(rng: np.random.Generator, count: int) -> Iterator[Finding
     budget = int(0.4 * n.sum())
     # Weights without a pattern: no two pixels have fragments at the same scale, a tie that the index would decide.
     weights = rng.uniform(0.1, 1.0, count)
-    plain = budget_fill(weights, n, budget, 1)
+    plain = budget_fill(weights, n, budget)
     for name, order in (("reversed", np.arange(count)[::-1]), ("shuffled", rng.permutation(count))):
         moved = np.empty_like(plain)
-        moved[order] = budget_fill(weights[order], n[order], budget, 1)
+        moved[order] = budget_fill(weights[order], n[order], budget)
         wrong = np.flatnonzero(moved != plain)
         yield counted("fill.order", f"{count:.0e} importances, {name}", len(wrong), f"pixel {wrong[:1]}")
     with one_thread():
-        alone = budget_fill(weights, n, budget, 1)
+        alone = budget_fill(weights, n, budget)
     yield counted("fill.order", f"{count:.0e} importances, 1 thread", int((alone != plain).sum()))

@@ -1,4 +1,4 @@
-"""The compute passes that allot slots against their twin in numpy, which `services.stress.fills` judges."""
+"""The compute passes that cut pixels at whole bins against their twin in numpy, which `stress.fills` judges."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.allocation.gpu import BLOCK, GpuAllocation
-from renderer.allocation.lattice import Curves, curves_of, solve_on_lattice
+from renderer.allocation.cuts import Cuts, events_of, solve_cuts, within_limits
+from renderer.allocation.gpu import BLOCK, FrameAllocation
+from renderer.bin_pass import Binned
 from renderer.programs import Programs
+from schemas.tail import BINNED_TAILS, TAILS, TailName
 from services.stress.allocations import edge_budgets
-from services.stress.fills import gain_cases, overflow_cases
+from services.stress.fills import bin_counts, gain_cases, overflow_cases, whole_bins
 from services.stress.findings import Finding, Options, compared
 from services.stress.gl_bounds import bound_of
 
@@ -21,7 +23,7 @@ PATH = "allocation"
 
 
 def rows(ctx: moderngl.Context, options: Options, driver: str) -> Iterator[Finding]:
-    """All kinds of gain curves at every edge budget; each search begins where the one before it ended.
+    """All kinds of gain curves and counts at every edge budget.
 
     Args:
         ctx: The context.
@@ -30,27 +32,35 @@ def rows(ctx: moderngl.Context, options: Options, driver: str) -> Iterator[Findi
     """
     rng = np.random.default_rng(options.seed)
     pixels = BLOCK + 100 if options.quick else 20 * BLOCK + 100
-    n = np.where(rng.random(pixels) < 0.02, 4096, rng.integers(0, 7, pixels)).astype(np.int32)
-    bound, programs, allocation = bound_of(PATH, deep=False), Programs(ctx), GpuAllocation(ctx)
-    for name, (a, b) in (gain_cases(rng, pixels) | overflow_cases(rng, pixels)).items():
-        curves = curves_of(a, b)
-        for budget in edge_budgets(n):
-            found = _allotted(ctx, programs, allocation, curves, n, budget)
-            truth = solve_on_lattice(curves, n, budget).k.astype(np.float64)
-            path = f"{PATH} · {driver}"
-            row = compared(path, "gain curves", found, truth, bound.value, bound.measure, bound.floor)
-            yield replace(row, where=f"{name}, F {budget}, {row.where}")
+    bound, programs, path = bound_of(PATH, deep=False), Programs(ctx), f"{PATH} · {driver}"
+    for tail in BINNED_TAILS:
+        counts = bin_counts(rng, pixels, TAILS[tail].bins)
+        n = whole_bins(counts).sum(axis=1)
+        for name, curve in (gain_cases(rng, pixels) | overflow_cases(rng, pixels)).items():
+            events, limited = events_of(*curve, counts), np.stack(within_limits(*curve), axis=1)
+            for budget in {*edge_budgets(n), 1}:
+                truth = solve_cuts(events, budget)
+                found = _placed(ctx, programs, tail, limited, counts, budget, truth)
+                expected = np.stack([truth.cut, np.zeros(pixels)], axis=1)
+                row = compared(path, "gain curves", found, expected, bound.value, bound.measure, bound.floor)
+                yield replace(row, where=f"{tail}, {name}, F {budget}, {row.where}")
 
 
-def _allotted(
+def _placed(
     ctx: moderngl.Context,
     programs: Programs,
-    allocation: GpuAllocation,
-    curves: Curves,
-    n: NDArray[np.int32],
+    tail: TailName,
+    curves: NDArray[np.float32],
+    counts: NDArray[np.uint8],
     budget: int,
+    truth: Cuts,
 ) -> NDArray[np.float64]:
-    counts = ctx.buffer(n.astype(np.uint32))
-    frame = allocation.select(programs, counts, len(n), budget)
-    frame.solve(ctx.buffer(np.stack([curves.a, curves.rate], axis=1)))
-    return np.diff(np.frombuffer(frame.place().read(), dtype=np.uint32).astype(np.float64))
+    """float64 [P, 2], the cut of every pixel, and the fragments of the true one that its run has no room for."""
+    binned = Binned(tail, TAILS[tail], [], ctx.buffer(reserve=8), ctx.buffer(np.ascontiguousarray(counts)), [])
+    allocation = FrameAllocation(ctx, programs, binned, len(counts), budget)
+    allocation.begin()
+    offsets = np.frombuffer(allocation.place(ctx.buffer(curves)).read(), dtype=np.uint32)
+    assert binned.counts is not None, "they are given"
+    words = np.frombuffer(binned.counts.read(), dtype=np.uint32).reshape(len(counts), -1)
+    room = np.diff(offsets.astype(np.int64), append=budget)
+    return np.stack([words[:, 0], np.maximum(truth.k - room, 0)], axis=1).astype(np.float64)

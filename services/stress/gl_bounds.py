@@ -64,9 +64,10 @@ BOUNDS: Final[dict[str, Bound]] = {
         0.0,
         "absolute",
         1.0,
-        "Pixels outside of `k_min <= K <= n`, fragments above F (or unspent, where the technique uses its budget "
-        "whole), numbers that are not finite.",
+        "Pixels outside of `0 <= K <= n`, fragments above F (or unspent, where the technique uses its budget "
+        "whole; as many as any pixel's next bin has, where cores are whole bins), numbers that are not finite.",
     ),
+    "binned": _picture(4e-6, "The tail of a binned `bounded` technique, of all fragments."),
     "weighted-average": _picture(1e-6, "Sums of up to 100 fragments; `(1 - A/n)^n` multiplies a rounding by n."),
     "weighted-blended": _picture(2e-6, "Weights by depth have a few roundings each; their mean cancels their size."),
     "moment": _picture(
@@ -97,53 +98,41 @@ BOUNDS: Final[dict[str, Bound]] = {
         "A tight group and one faint fragment far behind: the moments do not say which fragment of the group is "
         "in front. What remains is an average of its colours: finite, and within them. 0.14 was the worst of 40,000.",
     ),
-    "gather": Bound(
-        1.5e-5,
-        "relative",
-        1e-3,
-        "Sums by blending in float32: up to 100 roundings, and those of `-ln(1-a)` as in the tails.",
-    ),
-    "gather.half": Bound(
-        2.0**-10,
-        "relative",
-        1e-3,
-        "Sums in half floats, as they are beside depth bins, over n + 2: what is there and what is added is cut to "
-        "11 bits by each addition.",
-    ),
-    "bins.optical depth": Bound(
-        1.5e-5, "relative", 1e-3, "The optical depth beside depth bins, in float32, as in `gather`."
-    ),
-    "bins.shares": Bound(
+    "range": Bound(
         0.0,
         "absolute",
         1.0,
-        "Fifteenths by which what is kept of 8 and 16 depth bins differs from integer arithmetic: places are rounded "
-        "operation by operation, bins add whole units and stop at 65,535.",
+        "Tiles whose range of depths leaves out what a ray through the middle of a quarter of the tile meets, or "
+        "reaches a twentieth farther than all of them.",
     ),
-    "features": Bound(8e-6, "relative", 1.0, "Features in GLSL of those sums, but the spreads."),
-    "features.spread": Bound(
-        1e-3,
+    "bins.kept": Bound(
+        0.0,
         "absolute",
         1.0,
-        "Standard deviations: `sqrt(E[x^2] - E[x]^2)` cancels where values are nearly equal, and the root turns 1e-6 "
-        "into 1e-3.",
+        "Words of 16 bits in which what is kept of depth bins differs from integer arithmetic: places are rounded "
+        "operation by operation, bins add whole units and stop at 65,535.",
     ),
-    "features.front": Bound(
-        0.0, "absolute", 1.0, "`front_1` to `front_15`, in fifteenths: the kept shares as they are."
+    "bins.counts": Bound(0.0, "absolute", 1.0, "Fragments by which the count of a bin, which ends at 255, is wrong."),
+    "bins.colours": Bound(
+        2.0**-10,
+        "relative",
+        1e-3,
+        "Sums in half floats, over n + 2: what is there and what is added is cut to 11 bits by each addition.",
     ),
+    "features": Bound(8e-6, "relative", 1.0, "Features in GLSL of n, D and the tile's range, and the background."),
+    "features.kept": Bound(0.0, "absolute", 1.0, "`front_b` and `mean_b`, in whole steps: what is kept as it is."),
     "features.half": Bound(
         3.0 * 2.0**-10,
         "relative",
         1.0,
-        "Features of half-float sums, over n + 2: a mean has the error of one sum, a mean weighted by alpha of two, a "
-        "covariance of three.",
+        "Features of half-float sums, over n + 2: a mean has the error of one sum, the covariance of three.",
     ),
     "features.half spread": Bound(
         0.055,
         "absolute",
         1.0,
         "Standard deviations of half-float sums, over `sqrt(n + 2)`: the variance has the error of `E[x^2]` and twice "
-        "that of `E[x]`, and where it should be 0 the root of that is all there is: `sqrt(3 x 2^-10)`.",
+        "that of `E[x]`, and where it should be small the root of that is all there is: `sqrt(3 x 2^-10)`.",
     ),
     "predict.glsl": Bound(
         1e-5, "relative", 1.0, "The network in GLSL on the same float32 features: dot products of a few dozen terms."
@@ -155,8 +144,8 @@ BOUNDS: Final[dict[str, Bound]] = {
         0.0,
         "absolute",
         1.0,
-        "Fragments by which a pixel's k differs from that of the same algorithm in numpy: every operation is rounded "
-        "by itself, so that nothing may.",
+        "Bins by which a pixel's cut differs from that of the same algorithm in numpy, and fragments that its run has "
+        "no room for: every operation is rounded by itself, so that nothing may.",
     ),
 }
 """Fast path, without its driver -> bound, for up to 100 fragments a pixel."""
@@ -172,31 +161,28 @@ DEEP: Final[dict[str, Bound]] = {
         "As above; with F = 0 all 4096 fragments are in the tail's sums, which is as `weighted-average` has it. The "
         "exponents of binned tails, up to 60, are rounded three times: `180 x 2^-24 = 1.1e-5` of a weight.",
     ),
+    "binned": _picture(2.5e-5, "The tail of a binned `bounded` technique, of all 4096 fragments."),
     "weighted-average": _picture(
         2.5e-5, "Sums of 4096 equal terms round in one direction for long: up to `n / 2 2^-24 = 1.2e-4` of them."
     ),
     "weighted-blended": _picture(1e-5, "The same; weights differ, so that roundings cancel."),
     "stochastic": _picture(1e-5, "Sums of 4096 terms."),
-    "gather": Bound(1e-4, "relative", 1e-3, "Sums of 4096 terms."),
-    "gather.half": Bound(
+    "bins.colours": Bound(
         2e-4,
         "relative",
         1e-3,
         "Half floats stall: where a sum is 1024 times what is added, nothing may be, and from 512 times on half of it "
         "may be lost. So up to `n 2^-10 / (1 + n 2^-10) = 4/5` of a sum is lost at n = 4096, over n + 2: 1.95e-4.",
     ),
-    "bins.optical depth": Bound(1e-4, "relative", 1e-3, "Sums of 4096 terms, as in `gather`."),
     "features.half": Bound(
         1e-3,
         "relative",
         1.0,
-        "Features of sums of which up to 4/5 is lost: a mean is too small by that, a mean weighted by alpha may be "
-        "five times as large, over n + 2.",
+        "Features of sums of which up to 4/5 is lost: a mean is too small by that, over n + 2.",
     ),
     "features.half spread": Bound(
         0.016, "absolute", 1.0, "Nothing is left of a spread but that it is at most 1, over `sqrt(n + 2)`."
     ),
-    "features": Bound(5e-5, "relative", 1.0, "Features of sums of 4096 terms."),
 }
 """The same for 4096 fragments a pixel, where that differs."""
 

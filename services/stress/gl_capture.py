@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from renderer.capture import capture
 from renderer.techniques.ordered import Ordered, capture_ordered
+from renderer.tile_range import tile_grid, tile_ranges
 from schemas.colour import decode_gamma2
 from schemas.fragments import FragmentDump
+from schemas.tail import RANGE_TILE
 from services.stress.findings import Finding, compared
 from services.stress.gl_bounds import BOUNDS
 from services.stress.gl_cases import Case, Scenery
@@ -47,11 +49,15 @@ class Geometry:
 
     Args:
         scenery: In perspective, without lens shift.
+        spacing: Pixels between rays, each of which is in the middle of so many: as many of them as it takes for tiles
+            of `RANGE_TILE` to cover the picture. 1: pixels, as many as there are.
     """
 
-    def __init__(self, scenery: Scenery) -> None:
+    def __init__(self, scenery: Scenery, spacing: int = 1) -> None:
         scene, view = scenery.scene, scenery.view
         width, height = scenery.size
+        columns, rows = tile_grid(width, height) if spacing > 1 else (width, height)
+        rays = RANGE_TILE // spacing if spacing > 1 else 1
         to_view = view.world_to_view()
         world = scene.positions.astype(np.float64).reshape(-1, scenery.corners, 3)
         self.corners = world @ to_view[:3, :3].T + to_view[:3, 3]
@@ -60,11 +66,11 @@ class Geometry:
         self.rgba = scene.colours[:: scenery.corners]
         self.near, self.far = view.clip_range(scene.bounds)
         half = np.tan(np.radians(view.fov) / 2.0)
-        self.step = 2.0 * half / height  # of a ray, from pixel to pixel
-        x = (2.0 * (np.arange(width) + 0.5) / width - 1.0) * half * width / height
-        y = (1.0 - 2.0 * (np.arange(height) + 0.5) / height) * half
+        self.step = 2.0 * half / height * spacing  # from ray to ray
+        x = (2.0 * spacing * (np.arange(columns * rays) + 0.5) / width - 1.0) * half * width / height
+        y = (1.0 - 2.0 * spacing * (np.arange(rows * rays) + 0.5) / height) * half
         grid = np.meshgrid(x, y)
-        self.rays = np.stack([grid[0].ravel(), grid[1].ravel(), -np.ones(width * height)], axis=1)
+        self.rays = np.stack([grid[0].ravel(), grid[1].ravel(), -np.ones(len(x) * len(y))], axis=1)
         self.mixed = scene.batches[0].layer == "mixed"
 
     def hits(self) -> Hits:
@@ -159,7 +165,8 @@ def rows(case: Case, driver: str) -> Iterator[Finding]:
 def digest(dump: FragmentDump) -> str:
     """sha256 of all arrays of a dump: drivers that follow the same rules agree on every bit."""
     hasher = hashlib.sha256()
-    for array in (dump.offsets, dump.rgba, dump.depth, dump.background, dump.facing):
+    ranges = tile_ranges(dump)
+    for array in (dump.offsets, dump.rgba, dump.depth, dump.background, dump.facing, ranges):
         hasher.update(np.ascontiguousarray(array).tobytes())
     return hasher.hexdigest()
 

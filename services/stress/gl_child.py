@@ -23,7 +23,7 @@ import numpy as np
 from renderer.context import describe, gl_context
 from renderer.programs import Programs
 from schemas.problem import Problem
-from services.stress import gl_allocation, gl_capture, gl_moment, gl_network, gl_techniques
+from services.stress import gl_allocation, gl_bins, gl_capture, gl_moment, gl_network, gl_techniques
 from services.stress.findings import Broken, Finding, NotRun, Options, Row
 from services.stress.gl_cases import Scenery, make_case, sceneries
 from services.stress.gl_drivers import DRIVERS, Driver
@@ -77,6 +77,7 @@ class Suite:
             return
         self._say({"digest": gl_capture.digest(case.dump), "case": scenery.name})
         yield from self._step("capture", scenery.name, partial(gl_capture.rows, case, self._driver))
+        yield from self._step("bins", scenery.name, partial(gl_bins.rows, case, self._driver))
         network = partial(gl_network.rows, case, networks, self._driver)
         yield from self._step("network", scenery.name, network)
         for name, work in gl_techniques.steps(case, self._options, self._driver, networks):

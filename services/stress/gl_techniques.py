@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.allocation.fill import budget_fill, feasible_k_min
+from renderer.allocation.fill import budget_fill
 from renderer.frame import Frame
 from renderer.techniques import (
     TECHNIQUES,
@@ -25,7 +25,8 @@ from renderer.techniques import (
 )
 from renderer.techniques.base import ChainForm
 from renderer.techniques.chain import one_pass_available
-from schemas.tail import DEFAULT_TAIL, TAILS, TailName
+from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, TAIL_NAMES, TailName
+from services.stress.fills import whole_bins
 from services.stress.findings import Finding, Options, compared
 from services.stress.gl_bounds import bound_of
 from services.stress.gl_cases import Case
@@ -35,7 +36,9 @@ from services.stress.gl_stacks import ILL_CONDITIONED
 from services.stress.gl_twins import Truth, Unbounded, unbounded
 
 BOUNDED = tuple(name for name, entry in TECHNIQUES.items() if entry.family == "bounded")
-_WHOLE = tuple(name for name in BOUNDED if name not in (KBuffer.name, KBufferDynamic.name))
+_LEARNED = tuple(name for name in BOUNDED if TECHNIQUES[name].needs_bundle)
+"""Those whose cores are whole bins of their bundle's tail."""
+_WHOLE = tuple(name for name in BOUNDED if name not in (KBuffer.name, KBufferDynamic.name, *_LEARNED))
 """Those that give every fragment of their budget away."""
 
 
@@ -50,7 +53,7 @@ class Form:
     """
 
     path: str
-    tails: tuple[TailName, ...] = TAILS
+    tails: tuple[TailName, ...] = TAIL_NAMES
     chain: ChainForm = "auto"
 
 
@@ -72,7 +75,7 @@ def random_allocation(frame: Frame, budget: Budget) -> NDArray[np.int32]:
     """An allocation that no rule would make: every k that a budget allows occurs somewhere."""
     n = frame.count()
     weights = np.random.default_rng(budget.fragments).random(frame.pixels) ** 4
-    return budget_fill(weights, n, budget.fragments, feasible_k_min(n, budget.fragments))
+    return budget_fill(weights, n, budget.fragments)
 
 
 def steps(
@@ -90,15 +93,16 @@ def steps(
     for each in unbounded(options):
         if not (case.scenery.deep and each.peeled):
             yield each.name, partial(picture_rows, case, truth, each, driver)
-    needs = Needs(bundle=networks.plain, allocate=random_allocation)
+    needs = Needs(allocate=random_allocation)
     for name in BOUNDED:
-        yield name, partial(bounded_rows, case, truth, name, needs, driver)
-    for suffix, bundle, tail in (
-        ("binned sums", networks.binned, DEFAULT_TAIL),
-        ("overflowing network", networks.overflowing, "density"),
-    ):
-        form = Form(f"{KBufferDeep.name}.{suffix}", (tail,))
-        yield form.path, partial(bounded_rows, case, truth, KBufferDeep.name, Needs(bundle=bundle), driver, form)
+        if name not in _LEARNED:
+            yield name, partial(bounded_rows, case, truth, name, needs, driver)
+            continue
+        for tail in BINNED_TAILS:
+            form, own = Form(name, (tail,)), Needs(bundle=networks.bundles[tail])
+            yield f"{name}.{tail}", partial(bounded_rows, case, truth, name, own, driver, form)
+    form, own = Form(f"{KBufferDeep.name}.overflowing network", (DEFAULT_TAIL,)), Needs(bundle=networks.overflowing)
+    yield form.path, partial(bounded_rows, case, truth, KBufferDeep.name, own, driver, form)
     if one_pass_available(case.frame.ctx):  # the others have taken it
         form = Form(f"{KBufferOptimal.name}.two-pass", chain="two-pass")
         yield form.path, partial(bounded_rows, case, truth, KBufferOptimal.name, needs, driver, form)
@@ -132,32 +136,49 @@ def bounded_rows(
             fragments = BUDGETS[label](case.dump.total, occupied)
             for _ in range(min(2, TECHNIQUES[name].settles)):  # what learns from its frames has learnt in the second
                 rendered = made.render(case.frame, Budget(fragments, tail, chain=form.chain))
-            wrong += [f"F = {label}, {tail}: {why}" for why in broken_limits(name, rendered, case, fragments)]
+            wrong += [f"F = {label}, {tail}: {why}" for why in broken_limits(name, rendered, case, fragments, tail)]
             linear, expected = rendered.linear.reshape(-1, 3), truth.hybrid(rendered.k, tail)
             row = _compared(case, f"{form.path}.{tail} · {driver}", case.pixels, linear, expected, "bounded")
             yield replace(row, where=f"F = {label}, {row.where}")
     count = float(len(wrong))
     bound = bound_of("bounded.limits", deep=False)
     where = f"{case.scenery.name}: {wrong[0]}" if wrong else "nowhere"
-    yield Finding(f"{form.path}.F, K and k_min · {driver}", case.name, count, count, where, bound.value, bound.measure)
+    yield Finding(f"{form.path}.F and K · {driver}", case.name, count, count, where, bound.value, bound.measure)
 
 
-def broken_limits(name: str, rendered: Rendered, case: Case, fragments: int) -> list[str]:
+def broken_limits(
+    name: str, rendered: Rendered, case: Case, fragments: int, tail: TailName = DEFAULT_TAIL
+) -> list[str]:
     """What a picture within a budget does that it must not (METHOD.md section 3), in words."""
     n, k = case.dump.counts, rendered.k.astype(np.int64)
     whole = name in _WHOLE
-    # `kbuffer` reserves slots where nothing is, so that its budget may not reach every occupied pixel.
-    k_min = feasible_k_min(n, fragments) if name != KBuffer.name else 0
     spent = min(fragments, case.dump.total)
     checks = {
         "the picture is not finite": not np.isfinite(rendered.linear).all(),
         f"sum K = {k.sum()} is above F": k.sum() > fragments,
         f"sum K = {k.sum()} leaves a part of F": whole and k.sum() != spent,
         "K is above n": bool((k > n).any()),
-        "K is below k_min": bool((k < np.minimum(n, k_min)).any()),
+        "K is below 0": bool((k < 0).any()),
         "slots are not what was captured": rendered.captured != k.sum(),
     }
+    if name in _LEARNED:
+        checks |= _broken_bins(case, k, fragments, tail)
     return [why for why, broken in checks.items() if broken]
+
+
+def _broken_bins(case: Case, k: NDArray[np.int64], fragments: int, tail: TailName) -> dict[str, bool]:
+    """The same of cores of whole bins: which they are not, or which leave more than the next bin of any pixel."""
+    counts = case.frame.gather_bins(tail, counts=True).counts
+    assert counts is not None, "bins are counted"
+    usable = whole_bins(np.frombuffer(counts.read(), np.uint8).reshape(len(k), -1))
+    before = np.cumsum(usable, axis=1) - usable
+    waiting = np.where((before == k[:, None]) & (usable > 0), usable, 0)
+    cores = (usable * (before < k[:, None])).sum(axis=1)
+    left = fragments - int(k.sum())
+    return {
+        "cores are not whole bins": bool((cores != k).any()),
+        f"{left} fragments of F are left, and more bins would fit": bool(waiting.any() and left >= waiting.max()),
+    }
 
 
 def _compared(

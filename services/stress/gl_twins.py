@@ -31,6 +31,7 @@ from renderer.techniques import (
     WeightedBlended,
     technique,
 )
+from renderer.techniques.binned import DEFAULT_BINS
 from renderer.techniques.ordered import Ordered, capture_ordered
 from schemas.fragments import FragmentDump
 from schemas.tail import TailName
@@ -120,6 +121,7 @@ def unbounded(options: Options) -> list[Unbounded]:
     twins: dict[str, Twin] = {
         "depth-peeling": lambda truth: depth_peeling.picture(truth.dump),
         "dual-depth-peeling": lambda truth: dual_depth_peeling.picture(truth.dump),
+        "binned": lambda truth: truth.hybrid(np.zeros(truth.dump.pixels, int), DEFAULT_BINS),
         "weighted-average": lambda truth: weighted_average.picture(truth.dump),
         "weighted-blended": lambda truth: _blended(truth, 10),
         "moment": lambda truth: moment.picture(truth.dump),

@@ -17,11 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.allocation.fill import solve_lambda
-from renderer.depth_bins import MOST_BINS
 from renderer.features import FEATURES, derive, gather
 from schemas.bundle import FEATURE_LIMIT, ONNX
 from services.stress.bounds import counted, within
 from services.stress.cases import random_dump
+from services.stress.features import EVERY
 from services.stress.findings import Finding, NotRun, Options, Row, worst_of
 from services.stress.twins import network64
 
@@ -55,7 +55,7 @@ def run(options: Options) -> Iterator[Row]:
 
 
 def form(path: str, weights: Weights, folder: Path) -> Predict | NotRun:
-    """One form of the network: float32 [R, 41] to float32 [R, 2]; or why there is none here.
+    """One form of the network: float32 [R, F] to float32 [R, 2]; or why there is none here.
 
     Args:
         path: A key of `NEEDED`.
@@ -85,13 +85,13 @@ def _in_numpy(weights: Weights, inputs: Rows) -> Rows:
 
 
 def predicted64(weights: Weights, inputs: Rows) -> NDArray[np.float64]:
-    """float64 [R, 2], what the network answers to float32 [R, 41]."""
+    """float64 [R, 2], what the network answers to float32 [R, F]."""
     return network64(weights.mean, weights.std, weights.layers, inputs[:, weights.columns])
 
 
 def real_features(rng: np.random.Generator, rows: int) -> Rows:
-    """float32 [rows, 41] of pixels with fragments, depth bins included."""
-    features = derive(gather(random_dump(rng, math.ceil(1.3 * rows) + 8, 9), MOST_BINS))
+    """float32 [rows, F] of pixels with fragments, depth bins included."""
+    features = derive(gather(random_dump(rng, math.ceil(1.3 * rows) + 8, 9), EVERY))
     return features[features.any(axis=1)][:rows]
 
 
@@ -100,7 +100,7 @@ def networks(seed: int, real: Rows) -> dict[str, Weights]:
 
     Args:
         seed: Of the weights.
-        real: float32 [R, 41], features whose mean and spread normalise the inputs.
+        real: float32 [R, F], features whose mean and spread normalise the inputs.
     """
     from trainer.weights import Weights
 
@@ -134,7 +134,7 @@ def random_layers(rng: np.random.Generator, hidden: tuple[int, ...]) -> tuple[tu
 
 
 def feature_cases(rng: np.random.Generator, weights: Weights, real: Rows) -> dict[str, Rows]:
-    """Inputs of a network, float32 [R, 41]: real ones, and such as no picture has."""
+    """Inputs of a network, float32 [R, F]: real ones, and such as no picture has."""
     rows, columns = min(len(real), 2000), len(FEATURES)
     mean, std = weights.mean, weights.std
     signs = rng.choice([-1.0, 1.0], (rows, columns))
@@ -169,8 +169,8 @@ def _count_difference(
     """Largest difference of a pixel's count between two predictions at the same budget, and how many differ."""
     n = rng.integers(1, 40, len(truth))
     budget = int(0.4 * n.sum())
-    k, _ = solve_lambda(found[:, 0], found[:, 1], n, budget, 1)
-    expected, _ = solve_lambda(truth[:, 0], truth[:, 1], n, budget, 1)
+    k, _ = solve_lambda(found[:, 0], found[:, 1], n, budget)
+    expected, _ = solve_lambda(truth[:, 0], truth[:, 1], n, budget)
     return int(np.abs(k - expected).max()), int((k != expected).sum())
 
 

@@ -20,6 +20,7 @@ from renderer.features import gather
 from schemas.problem import Problem
 from services.stress.bounds import counted
 from services.stress.cases import dump_of, some_list
+from services.stress.features import EVERY
 from services.stress.findings import Finding, NotRun, Options, Row, worst_of
 from services.stress.predictors import form, networks, real_features
 
@@ -42,15 +43,15 @@ def run(options: Options) -> Iterator[Row]:
         calls: dict[str, Callable[[], object]] = {
             "depth, error_curves": partial(error_curves, bad),
             "depth, composite": partial(composite, bad, n),
-            "depth, gather": partial(gather, bad),
+            "depth, gather": partial(gather, bad, EVERY),
             "depth, labeller.allocate": partial(labeller.allocate, arrays, [10]),
             "g, error_curves": partial(error_curves, dump, g=number),
             "g, composite": partial(composite, dump, n, g=number),
             "weight, error_curves": partial(error_curves, dump, weights=wrong),
-            "weight, budget_fill": partial(budget_fill, wrong, n, 12, 0),
+            "weight, budget_fill": partial(budget_fill, wrong, n, 12),
             "weight, paper_fill": partial(paper_fill, wrong, 12),
-            "a, solve_lambda": partial(solve_lambda, wrong, some, n, 12, 0),
-            "b, solve_lambda": partial(solve_lambda, some, wrong, n, 12, 0),
+            "a, solve_lambda": partial(solve_lambda, wrong, some, n, 12),
+            "b, solve_lambda": partial(solve_lambda, some, wrong, n, 12),
         }
         for case, call in calls.items():
             rows.setdefault(case, []).append(_refusal(name, call))
@@ -74,7 +75,7 @@ def _networks(options: Options) -> Iterator[Row]:
             if isinstance(predict, NotRun):
                 continue  # said by the suite of the networks
             gain = predict(damaged).astype(np.float64)
-            yield _refusal(f"NaN as feature, {path}", partial(solve_lambda, gain[:, 0], gain[:, 1], n, 100, 1))
+            yield _refusal(f"NaN as feature, {path}", partial(solve_lambda, gain[:, 0], gain[:, 1], n, 100))
     weights.layers[0][0][0, 0] = np.nan
     yield _refusal("NaN as weight of a network, GLSL", partial(shader_source, weights))
 

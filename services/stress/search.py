@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from labeller.curves import error_curves
 from schemas.bundle import FEATURE_LIMIT
 from schemas.fragments import FragmentDump
-from schemas.tail import DENSITY_G, METRICS, TAILS, MetricName, TailName
+from schemas.tail import DENSITY_G, METRICS, TAIL_NAMES, MetricName, TailName
 from services.stress.bounds import within
 from services.stress.cases import dump_of, some_list
 from services.stress.curves import reference_errors
@@ -74,7 +74,7 @@ def _search(seconds: float, climb_once: Callable[[int], Finding]) -> Finding:
 def worst_list(seed: int, climb: int) -> tuple[FragmentDump, TailName, MetricName]:
     """The worst list of one climb: one pixel, and the tail and metric whose error was driven up."""
     rng = np.random.default_rng([seed, climb])
-    tail = TAILS[int(rng.integers(len(TAILS)))]
+    tail = TAIL_NAMES[int(rng.integers(len(TAIL_NAMES)))]
     metric = METRICS[int(rng.integers(len(METRICS)))]
     n = int(rng.integers(1, 9))
     depth = [(1.0, 10.0), (1e-3, 1e4), (1.0, 1.000001)][int(rng.integers(3))]
@@ -121,7 +121,7 @@ def _colours(rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.int
 def worst_features(
     seed: int, climb: int, weights: Weights, real: NDArray[np.float32], predict: Predict
 ) -> NDArray[np.float32]:
-    """float32 [128, 41], the batch of one climb in which a row was worst, within the clamp of a network's inputs.
+    """float32 [128, F], the batch of one climb in which a row was worst, within the clamp of a network's inputs.
 
     A whole batch, because what a library answers to a row can depend on those beside it.
 
@@ -129,7 +129,7 @@ def worst_features(
         seed: Of the search.
         climb: Which.
         weights: The network.
-        real: float32 [R, 41], features of pixels to start from.
+        real: float32 [R, F], features of pixels to start from.
         predict: The form that is compared with float64.
     """
     rng = np.random.default_rng([seed, climb])

@@ -8,12 +8,21 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from labeller.reference import Pixel, binned_exponents, depth_bins
-from renderer.depth_bins import MOST_BINS
+from labeller.reference import Pixel, binned_exponents, depth_bins, pixel_of
 from renderer.features import FEATURES, SUMS
 from schemas.bundle import FEATURE_LIMIT, GAIN_FLOOR
 from schemas.fragments import FragmentDump
-from schemas.tail import DENSITY_BINS, MAX_EXPONENT, SHARE_LEVELS, TailName
+from schemas.tail import (
+    LUMA,
+    MAX_EXPONENT,
+    MOST_BINS,
+    OPTICAL_UNIT,
+    PLAIN_SHARE,
+    ROOT_SHARE,
+    TAILS,
+    TailKind,
+    TailName,
+)
 
 Extended = NDArray[np.longdouble]
 
@@ -24,7 +33,7 @@ def extended_composite(pixel: Pixel, k: int, tail: TailName, g: float) -> Extend
     Args:
         pixel: A list.
         k: Core fragments.
-        tail: One of `schemas.tail.TAILS`.
+        tail: A name in `schemas.tail.TAILS`.
         g: Steepness of the density tail.
 
     Returns:
@@ -41,17 +50,17 @@ def extended_composite(pixel: Pixel, k: int, tail: TailName, g: float) -> Extend
         optical_depth = -np.log(np.maximum(one - alpha, np.longdouble(1e-3))).sum()
         relative = (depth[k:] - depth[0]) / (depth[-1] - depth[0])
         weight = behind * np.exp(-np.minimum(g * optical_depth * relative, MAX_EXPONENT))
-    if tail in DENSITY_BINS and pixel.n:
-        optical = -np.log(np.maximum(one - alpha, np.longdouble(1e-3)))
-        exponent = binned_exponents(pixel.depth, optical, DENSITY_BINS[tail])[k:]
+    if TAILS[tail].kind == TailKind.BINNED and pixel.n:
+        optical = -np.log(np.maximum(1.0 - pixel.alpha, 1e-3))
+        exponent = binned_exponents(pixel, optical, TAILS[tail])[k:]
         weight = behind * np.exp(-np.minimum(exponent, MAX_EXPONENT))
     if len(behind) == 0 or weight.sum() == 0.0:
         return np.asarray(core + through[k] * background)
     mean = (weight[:, None] * colour[k:]).sum(axis=0) / weight.sum()
-    if tail in ("density", "exact-coverage", *DENSITY_BINS):
-        beyond = np.prod(one - behind)
-    else:
+    if TAILS[tail].kind in (TailKind.WEIGHTED_AVERAGE, TailKind.PAPER):
         beyond = np.maximum(one - behind.sum() / len(behind), 0.0) ** len(behind)
+    else:
+        beyond = np.prod(one - behind)
     opacity = one if tail == "paper" else one - beyond
     return np.asarray(core + through[k] * (opacity * mean + beyond * background))
 
@@ -61,16 +70,15 @@ def exact_transmittance(level: int, n: int) -> Fraction:
     return Fraction(255 - level, 255) ** n
 
 
-def exact_hull(error: NDArray[np.float32], k_min: int) -> list[Fraction]:
-    """The lower convex hull of a curve at every k from `k_min`, exactly, until the error first is 0.
+def exact_hull(error: NDArray[np.float32]) -> list[Fraction]:
+    """The lower convex hull of a curve at every k, exactly, until the error first is 0.
 
     Args:
         error: float32 [n+1], `e(k)`, 0 at n.
-        k_min: First k.
     """
     values = [Fraction(float(e)) for e in error]
-    end = next(k for k in range(k_min, len(values)) if values[k] == 0)
-    hull, here = [values[k_min]], k_min
+    end = next(k for k in range(len(values)) if values[k] == 0)
+    hull, here = [values[0]], 0
     while here < end:
         # The steepest way down; of equal ones the longest.
         ahead = min(range(here + 1, end + 1), key=lambda k: ((values[k] - values[here]) / (k - here), -k))
@@ -80,84 +88,78 @@ def exact_hull(error: NDArray[np.float32], k_min: int) -> list[Fraction]:
     return hull
 
 
-def sums64(dump: FragmentDump, bins: int = 0) -> NDArray[np.float64]:
+def sums64(dump: FragmentDump, tail: TailName) -> NDArray[np.float64]:
     """The raw sums of every pixel, each as its definition reads.
 
     Args:
         dump: Fragments of a view.
-        bins: Depth bins of the tail; 0: it has none.
+        tail: A tail with bins.
 
     Returns:
-        float64 [P, 44], columns `renderer.features.SUMS`.
+        float64 [P, 4 TEXELS], columns `renderer.features.SUMS`.
     """
     out = np.zeros((dump.pixels, len(SUMS)))
-    for p in range(dump.pixels):
-        part = slice(dump.offsets[p], dump.offsets[p + 1])
-        if part.start == part.stop:
-            continue
-        depth, rgba = dump.depth[part].astype(np.float64), dump.rgba[part] / 255.0
-        rgb, alpha = rgba[:, :3], rgba[:, 3]
-        extent = depth[-1] - depth[0]
-        x = (depth - depth[0]) / extent if extent > 0.0 else np.zeros(len(depth))
-        columns = {
-            "n": len(depth),
-            "sum_a": alpha.sum(),
-            "sum_a2": (alpha**2).sum(),
-            "optical_depth": -np.log(np.maximum(1.0 - alpha, 1e-3)).sum(),
-            "sum_x": x.sum(),
-            "sum_x2": (x**2).sum(),
-            "z_min": depth[0],
-            "z_max": depth[-1],
-            "nearest_a": alpha[0],
-        }
-        for i, c in enumerate("rgb"):
-            columns |= {
-                f"sum_{c}": rgb[:, i].sum(),
-                f"sum_a_{c}": (alpha * rgb[:, i]).sum(),
-                f"sum_{c}2": (rgb[:, i] ** 2).sum(),
-                f"sum_{c}_x": (rgb[:, i] * x).sum(),
-                f"nearest_{c}": rgb[0, i],
-                f"background_{c}": dump.background[p, i] / 255.0,
-            }
-        if bins:
-            optical = -np.log(np.maximum(1.0 - alpha, 1e-3))
-            shares = depth_bins(depth, optical, bins)[1] / SHARE_LEVELS
-            columns |= {f"front_{MOST_BINS // bins * b}": shares[b] for b in range(1, bins)}
-        for name, value in columns.items():
+    for p in np.flatnonzero(dump.counts).tolist():
+        for name, value in _sums_of(pixel_of(dump, p, stored=True), tail).items():
             out[p, SUMS.index(name)] = value
     return out
 
 
+def _sums_of(pixel: Pixel, tail: TailName) -> dict[str, float]:
+    """Name -> value of one pixel's sums, those that are 0 left out.
+
+    Args:
+        pixel: Its list, stored colours / 255, n > 0.
+        tail: A tail with bins.
+    """
+    row, light = TAILS[tail], -np.log(np.maximum(1.0 - pixel.alpha, 1e-3))
+    kept = depth_bins(pixel, light, row)
+    x = (pixel.depth - pixel.nearest) / pixel.extent if pixel.extent > 0.0 else np.zeros(pixel.n)
+    x = np.clip(x, 0.0, 1.0)
+    y = PLAIN_SHARE * x + ROOT_SHARE * np.sqrt(x)
+    found = {
+        "n": float(pixel.n),
+        "optical_depth": kept.units / OPTICAL_UNIT,
+        "z_near": pixel.nearest,
+        "z_far": pixel.nearest + pixel.extent,
+        "sum_l_y": float((light * y).sum()),
+        "sum_l_y_luma": float((light * y * (pixel.colour @ np.array(LUMA))).sum()),
+    }
+    for i, c in enumerate("rgb"):
+        found[f"sum_l_{c}"] = float((light * pixel.colour[:, i]).sum())
+        found[f"sum_l_{c}2"] = float((light * pixel.colour[:, i] ** 2).sum())
+        found[f"background_{c}"] = float(pixel.background[i])
+    for b in range(1, row.bins):
+        found[f"front_{b}"] = float(kept.front[b])
+        if row.mean_levels:
+            found[f"mean_{b}"] = float(kept.mean[b - 1])
+    return found
+
+
 def features64(sums: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Features of raw sums in float64, [P, 41], columns `renderer.features.FEATURES`; zero where n = 0."""
+    """Features of raw sums in float64, [P, F], columns `renderer.features.FEATURES`; zero where n = 0.
+
+    Written by hand from what the features are, not from `FORMULAS`.
+    """
     s = {name: sums[:, i].astype(np.float64) for i, name in enumerate(SUMS)}
     used = s["n"] > 0.5
-    n = np.where(used, s["n"], 1.0)
-
-    def spread(squares: NDArray[np.float64], total: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.sqrt(np.maximum(0.0, squares / n - (total / n) ** 2))
-
-    with np.errstate(divide="ignore", invalid="ignore"):
-        columns = {
-            "log_n": np.log2(n),
-            "optical_depth": np.log1p(s["optical_depth"]),
-            "alpha_mean": s["sum_a"] / n,
-            "alpha_std": spread(s["sum_a2"], s["sum_a"]),
-            "alpha_nearest": s["nearest_a"],
-            "depth_mean": s["sum_x"] / n,
-            "depth_std": spread(s["sum_x2"], s["sum_x"]),
-            "depth_extent": np.log(1e-4 + (s["z_max"] - s["z_min"]) / np.where(used, s["z_max"], 1.0)),
+    light = np.where(used, s["optical_depth"], 1.0)
+    y, luma = s["sum_l_y"] / light, sum(LUMA[i] * s[f"sum_l_{c}"] for i, c in enumerate("rgb")) / light
+    columns = {
+        "log_n": np.log2(np.where(used, s["n"], 1.0)),
+        "optical_depth": np.log1p(s["optical_depth"]),
+        "depth_mean": y,
+        "luma_depth_cov": s["sum_l_y_luma"] / light - y * luma,
+        "depth_extent": np.log(1e-4 + (s["z_far"] - s["z_near"]) / np.maximum(1e-30, s["z_far"])),
+    }
+    for c in "rgb":
+        mean = s[f"sum_l_{c}"] / light
+        columns |= {
+            f"rgb_mean_{c}": mean,
+            f"rgb_std_{c}": np.sqrt(np.maximum(1e-3, s[f"sum_l_{c}2"] / light - mean**2)),
+            f"background_{c}": s[f"background_{c}"],
         }
-        for c in "rgb":
-            columns |= {
-                f"rgb_mean_{c}": s[f"sum_{c}"] / n,
-                f"rgb_alpha_{c}": s[f"sum_a_{c}"] / s["sum_a"],
-                f"rgb_nearest_{c}": s[f"nearest_{c}"],
-                f"background_{c}": s[f"background_{c}"],
-                f"rgb_std_{c}": spread(s[f"sum_{c}2"], s[f"sum_{c}"]),
-                f"rgb_depth_cov_{c}": s[f"sum_{c}_x"] / n - s[f"sum_{c}"] / n * s["sum_x"] / n,
-            }
-        columns |= {f"front_{j}": s[f"front_{j}"] for j in range(1, MOST_BINS)}
+    columns |= {f"{kept}_{b}": s[f"{kept}_{b}"] for kept in ("front", "mean") for b in range(1, MOST_BINS)}
     return np.where(used[:, None], np.stack([columns[name] for name in FEATURES], axis=1), 0.0)
 
 

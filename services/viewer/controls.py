@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from schemas.limits import LIMITS
-from schemas.tail import TAILS, TailName
+from schemas.tail import TAIL_NAMES, TailName
 from schemas.view import Vec3, View
 from services.viewer.camera import aimed, panned, turned, zoomed
 from services.viewer.layout import LAYOUTS, Layout
@@ -134,7 +134,7 @@ def _budget(step: int) -> Change:
 
 
 def _tail(step: int) -> Change:
-    return lambda look, _: replace(look, tail=TAILS[(TAILS.index(look.tail) + step) % len(TAILS)])
+    return lambda look, _: replace(look, tail=TAIL_NAMES[(TAIL_NAMES.index(look.tail) + step) % len(TAIL_NAMES)])
 
 
 def _layout(layout: Layout) -> Change:

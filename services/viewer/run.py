@@ -6,8 +6,9 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 
+from renderer.techniques import TECHNIQUES
 from schemas.bundle import load_manifest
-from services.options import chosen_tail
+from services.options import check_trained_tail, chosen_tail
 from services.progress import Progress
 from services.render_options import EVERY, parse_techniques
 from services.viewer import statistics
@@ -73,6 +74,8 @@ def _show(options: ViewerOptions, scene: Opened, source: Source, progress: Progr
 def _session(options: ViewerOptions, scene: Opened, source: Source) -> Session:
     asked = options.render
     trained = None if source.folder is None else load_manifest(source.folder).tail
+    if any(TECHNIQUES[name].needs_bundle for name in (asked.techniques[0], options.against)):
+        check_trained_tail(asked.tail, trained)
     tail = chosen_tail(asked.tail, asked.g, trained)
     studio = Studio(scene.scene.gpu(), replace(asked.needs, bundle=source.folder), asked.background, tail.g)
     look = Look(

@@ -48,7 +48,7 @@ def row(frame: int, side: str, shot: Shot, compared: Compared, bundle: str) -> R
         "height": wish.size[1],
         "budget_factor": wish.factor,
         "budget": shot.budget.fragments,
-        "tail": wish.tail,
+        "tail": shot.budget.tail,
         "g": shot.budget.g,
         "fragments": compared.fragments,
         "captured": rendered.captured,

@@ -41,7 +41,7 @@ class Wish:
         view: The camera.
         size: Width and height, pixels.
         factor: Budget as a multiple of width * height.
-        tail: Of the bounded techniques.
+        tail: Of the bounded techniques without a bundle, which has its own.
     """
 
     technique: str
@@ -186,7 +186,10 @@ class Studio:
         return Shot(wish, budget, rendered, recording, number)
 
     def _budget(self, wish: Wish, size: tuple[int, int]) -> Budget:
-        return Budget(max(1, int(wish.factor * size[0] * size[1])), wish.tail, self.g)
+        made, fragments = self._techniques[wish.technique], max(1, int(wish.factor * size[0] * size[1]))
+        if isinstance(made, KBufferDeep):
+            return Budget(fragments, made.manifest.tail.name, made.manifest.tail.g)
+        return Budget(fragments, wish.tail, self.g)
 
     def _optimal(self, frame: Frame, budget: Budget) -> NDArray[np.int32]:
         """What `kbuffer-optimal` renders of the view under way."""

@@ -1,4 +1,4 @@
-"""The compute passes that allot slots against their twin in numpy: the same to the bit, on every driver."""
+"""The compute passes that choose cuts against their twin in numpy: the same to the bit, on every driver."""
 
 from __future__ import annotations
 
@@ -9,12 +9,25 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from renderer.allocation.fill import feasible_k_min, solve_lambda
-from renderer.allocation.gpu import BLOCK, STATE, FrameAllocation, GpuAllocation, SolvedState
-from renderer.allocation.lattice import LAST, MOST_FRAGMENTS, Curves, curves_of, solve_on_lattice
+from renderer.allocation.cuts import FULL, HALF_BITS, MOST_CORE, events_of, solve_cuts, usable_counts, within_limits
+from renderer.allocation.gpu import BLOCK, STATE, AllocationState, FrameAllocation
+from renderer.bin_pass import Binned
 from renderer.programs import Programs
-from services.stress.allocations import edge_budgets
+from schemas.tail import BINNED_TAILS, TAILS, TailName
 from services.stress.fills import gain_cases, overflow_cases
+
+Numbers = NDArray[np.float32]
+NAMES = [*gain_cases(np.random.default_rng(0), 1), *overflow_cases(np.random.default_rng(0), 1)]
+
+
+@dataclass
+class Placed:
+    """What the passes made of a frame, as they leave it for capturing."""
+
+    cut: NDArray[np.int64]
+    cursor: NDArray[np.int64]
+    offset: NDArray[np.int64]
+    state: AllocationState
 
 
 @dataclass
@@ -24,19 +37,21 @@ class Bench:
     ctx: moderngl.Context
     programs: Programs
 
-    def begin(self, allocation: GpuAllocation, n: NDArray[np.integer], budget: int) -> FrameAllocation:
-        counts = self.ctx.buffer(n.astype(np.uint32))
-        return allocation.select(self.programs, counts, len(n), budget)
+    def begin(self, counts: NDArray[np.integer], budget: int, tail: TailName = "binned-8") -> FrameAllocation:
+        buffer = self.ctx.buffer(np.ascontiguousarray(counts, dtype=np.uint8))
+        binned = Binned(tail, TAILS[tail], [], self.ctx.buffer(reserve=8), buffer, [])
+        allocation = FrameAllocation(self.ctx, self.programs, binned, len(counts), budget)
+        allocation.begin()
+        return allocation
 
-    def solve(
-        self, allocation: GpuAllocation, curves: Curves, n: NDArray[np.integer], budget: int
-    ) -> tuple[NDArray[np.int64], SolvedState]:
-        frame = self.begin(allocation, n, budget)
-        frame.solve(self.ctx.buffer(np.stack([curves.a, curves.rate], axis=1)))
-        offsets = np.frombuffer(frame.place().read(), dtype=np.uint32)
-        assert len(offsets) == len(n) + 1
-        assert offsets[0] == 0
-        return np.diff(offsets.astype(np.int64)).astype(np.int64), frame.read_state()
+    def place(
+        self, a: Numbers, b: Numbers, counts: NDArray[np.integer], budget: int, tail: TailName = "binned-8"
+    ) -> Placed:
+        allocation = self.begin(counts, budget, tail)
+        offsets = allocation.place(self.ctx.buffer(np.stack([a, b], axis=1).astype(np.float32)))
+        offset = np.frombuffer(offsets.read(), dtype=np.uint32).astype(np.int64)
+        words = np.frombuffer(allocation._buffers[1].read(), dtype=np.uint32).reshape(len(counts), -1)
+        return Placed(*words[:, :2].astype(np.int64).T, offset, allocation.read_state())
 
 
 @pytest.fixture(scope="module")
@@ -44,136 +59,126 @@ def bench(gl: moderngl.Context) -> Bench:
     return Bench(gl, Programs(gl))
 
 
-def usual(rng: np.random.Generator, pixels: int) -> tuple[NDArray[np.int64], Curves]:
-    n = np.where(rng.random(pixels) < 0.02, 4096, rng.integers(0, 7, pixels))
-    return n, curves_of(rng.normal(-8.0, 3.0, pixels), rng.uniform(0.02, 2.0, pixels))
+def usual(rng: np.random.Generator, pixels: int, bins: int = 8) -> tuple[Numbers, Numbers, NDArray[np.int64]]:
+    """Curves and counts as pictures have them, some bins full, some pixels empty."""
+    counts = rng.integers(0, 5, (pixels, bins)) * rng.integers(0, 2, (pixels, bins))
+    counts[rng.random(pixels) < 0.3] = 0
+    counts[rng.random((pixels, bins)) < 0.002] = FULL
+    counts[rng.random((pixels, bins)) < 0.002] = FULL - 1
+    a, b = rng.normal(-8.0, 3.0, pixels), rng.uniform(0.02, 2.0, pixels)
+    return a.astype(np.float32), b.astype(np.float32), counts
+
+
+def edge_budgets(counts: NDArray[np.integer]) -> list[int]:
+    total = int(usable_counts(counts).sum())
+    return sorted({0, 1, total // 7, total // 2, max(total - 1, 0), total, 2 * total, 2**33})
+
+
+def assert_is_the_twins(found: Placed, a: Numbers, b: Numbers, counts: NDArray[np.integer], budget: int) -> None:
+    expected = solve_cuts(events_of(a, b, counts), budget)
+    assert np.array_equal(found.cut, expected.cut)
+    assert found.state.complete == (expected.rank is None)
+    assert found.state.rank == expected.rank
+    assert found.state.occupied == np.count_nonzero(counts.any(axis=1))
+    # Runs of the pool: as long as k where anything is captured, one after the other, within the budget.
+    assert np.array_equal(found.cursor, found.offset)
+    ends = found.offset + expected.k
+    assert (ends[:-1] <= found.offset[1:]).all()
+    assert ends.max(initial=0) <= budget
+    assert expected.k.sum() <= budget
 
 
 @pytest.mark.parametrize("pixels", [1, 63, 127, BLOCK - 1, BLOCK, BLOCK + 1, 9 * BLOCK + 777])
-def test_counts_equal_the_twins_for_every_size(bench: Bench, ctx: moderngl.Context, pixels: int) -> None:
-    rng = np.random.default_rng(pixels)
-    n, curves = usual(rng, pixels)
-    allocation = GpuAllocation(ctx)
-    for budget in {*edge_budgets(n.astype(np.int32)), 0, 1, int(n.sum()), 2 * int(n.sum())}:
-        k, state = bench.solve(allocation, curves, n, budget)
-        expected = solve_on_lattice(curves, n, budget)
-        assert np.array_equal(k, expected.k)
-        assert k.sum() == min(budget, n.sum())
-        assert state.complete == (expected.index is None)
-        assert state.k_min == feasible_k_min(n, budget)
-        assert state.occupied == np.count_nonzero(n)
-        assert state.complete or state.index == expected.index
+def test_cuts_equal_the_twins_for_every_size(bench: Bench, pixels: int) -> None:
+    a, b, counts = usual(np.random.default_rng(pixels), pixels)
+    for budget in edge_budgets(counts):
+        assert_is_the_twins(bench.place(a, b, counts, budget), a, b, counts, budget)
 
 
-def every_case(rng: np.random.Generator, pixels: int) -> dict[str, tuple[NDArray[np.float32], NDArray[np.float32]]]:
-    return gain_cases(rng, pixels) | overflow_cases(rng, pixels)
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+def test_cuts_equal_the_twins_for_every_tail(bench: Bench, tail: TailName) -> None:
+    a, b, counts = usual(np.random.default_rng(1), 3000, TAILS[tail].bins)
+    for budget in edge_budgets(counts):
+        assert_is_the_twins(bench.place(a, b, counts, budget, tail), a, b, counts, budget)
 
 
-@pytest.mark.parametrize("name", list(every_case(np.random.default_rng(0), 1)))
-def test_curves_of_all_kinds_give_the_twins_counts(bench: Bench, ctx: moderngl.Context, name: str) -> None:
+@pytest.mark.parametrize("name", NAMES)
+def test_curves_of_all_kinds_give_the_twins_cuts(bench: Bench, name: str) -> None:
     rng = np.random.default_rng(5)
-    pixels = 3000
-    n, _ = usual(rng, pixels)
-    curves = curves_of(*every_case(rng, pixels)[name])
-    for budget in edge_budgets(n.astype(np.int32)):
-        k, _ = bench.solve(GpuAllocation(ctx), curves, n, budget)
-        assert np.array_equal(k, solve_on_lattice(curves, n, budget).k)
+    _, _, counts = usual(rng, 3000)
+    a, b = within_limits(*(gain_cases(rng, 3000) | overflow_cases(rng, 3000))[name])
+    for budget in edge_budgets(counts):
+        assert_is_the_twins(bench.place(a, b, counts, budget), a, b, counts, budget)
 
 
-def test_counts_are_those_of_float64_but_for_a_few_ties(bench: Bench, ctx: moderngl.Context) -> None:
-    rng = np.random.default_rng(3)
-    pixels = 50_000
-    n = rng.integers(0, 30, pixels)
-    a, b = rng.normal(-8.0, 3.0, pixels).astype(np.float32), rng.uniform(0.05, 2.0, pixels).astype(np.float32)
-    for share in (0.1, 0.4, 0.8):
-        budget = int(share * n.sum())
-        k, _ = bench.solve(GpuAllocation(ctx), curves_of(a, b), n, budget)
-        expected, _ = solve_lambda(a, b, n, budget, feasible_k_min(n, budget))
-        assert np.abs(k - expected).max() <= 1
-        assert (k != expected).mean() < 1e-3
+def test_equal_prices_over_many_blocks_go_by_index(bench: Bench) -> None:
+    pixels = 5 * BLOCK + 99
+    counts = np.tile([0, 3, 0, 0, 2, 0, 0, 1], (pixels, 1))
+    a, b = np.full(pixels, -8.0, np.float32), np.full(pixels, 0.5, np.float32)
+    for budget in (3 * pixels // 2, 3 * pixels + 1, 3 * pixels + 2 * (3 * BLOCK + 5) + 1, 5 * pixels + 7):
+        found = bench.place(a, b, counts, budget)
+        assert_is_the_twins(found, a, b, counts, budget)
+        assert (np.diff(found.cut) <= 0).all()
+        assert len(np.unique(found.cut)) == (1 if budget == 3 * pixels + 1 else 2)
 
 
-def test_a_warm_start_needs_two_rounds_and_changes_nothing(bench: Bench, ctx: moderngl.Context) -> None:
-    rng = np.random.default_rng(7)
-    n, curves = usual(rng, 20_000)
-    budget = int(n.sum()) // 3
-    allocation = GpuAllocation(ctx)
-    k, cold = bench.solve(allocation, curves, n, budget)
-    assert cold.rounds == 4
-    for drift in (0.0, 0.02, -0.02):
-        moved = Curves(curves.a + np.float32(drift), curves.rate)
-        again, warm = bench.solve(allocation, moved, n, budget)
-        assert warm.rounds == 2
-        assert np.array_equal(again, solve_on_lattice(moved, n, budget).k)
-    again, _ = bench.solve(allocation, curves, n, budget)
-    assert np.array_equal(again, k)
+def test_full_bins_and_the_longest_core_end_it(bench: Bench) -> None:
+    rows = [
+        [FULL, 1, 1, 1, 1, 1, 1, 1],
+        [1, FULL, 1, 1, 1, 1, 1, 1],
+        [254, 254, 254, 254, 7, 1, 0, 1],
+        [254, 254, 254, 254, 8, 1, 0, 1],
+        [0, 0, 0, 0, 0, 0, 0, FULL],
+    ]
+    counts = np.array(rows)
+    a, b = np.zeros(len(rows), np.float32), np.ones(len(rows), np.float32)
+    found = bench.place(a, b, counts, 10_000)
+    assert found.cut.tolist() == [0, 1, 5, 4, 0]
+    assert found.state.complete, "all that can be in a core is"
+    assert np.diff([*found.offset, found.offset[-1]]).tolist() == [0, 1, MOST_CORE, 4 * 254, 0]
+    for budget in (1, 255, 1000, 2000):
+        assert_is_the_twins(bench.place(a, b, counts, budget), a, b, counts, budget)
 
 
-@pytest.mark.parametrize("shift", [-1e20, -500.0, -3.0, 3.0, 500.0, 1e20])
-def test_a_warm_start_that_misses_still_meets_the_budget(bench: Bench, ctx: moderngl.Context, shift: float) -> None:
-    rng = np.random.default_rng(9)
-    n, curves = rng.integers(0, 30, 5000), usual(rng, 5000)[1]
-    budget = int(n.sum()) // 4
-    allocation = GpuAllocation(ctx)
-    bench.solve(allocation, curves, n, budget)
-    elsewhere = Curves(curves.a + np.float32(shift), curves.rate)
-    k, state = bench.solve(allocation, elsewhere, n, budget)
-    expected = solve_on_lattice(elsewhere, n, budget)
-    assert np.array_equal(k, expected.k)
-    assert k.sum() == budget
-    assert state.index == expected.index
-    assert 3 <= state.rounds <= 5
+def test_a_frame_without_fragments_has_nothing_to_place(bench: Bench) -> None:
+    counts, zero = np.zeros((700, 8), np.int64), np.zeros(700, np.float32)
+    for budget in (0, 5):
+        found = bench.place(zero, zero + 1.0, counts, budget)
+        assert not found.cut.any()
+        assert not found.offset.any()
+        assert (found.state.complete, found.state.occupied) == (True, 0)
 
 
-def test_sums_beyond_32_bits_do_not_wrap(bench: Bench, ctx: moderngl.Context) -> None:
-    pixels = 80_000
-    n = np.full(pixels, MOST_FRAGMENTS + 10_000)
-    assert pixels * MOST_FRAGMENTS > 2**32
-    curves = curves_of(np.random.default_rng(1).normal(-8.0, 3.0, pixels), np.full(pixels, 0.02))
-    for budget in (pixels, 3_000_000, 2**31 - 2):
-        k, _ = bench.solve(GpuAllocation(ctx), curves, n, budget)
-        assert k.sum() == budget
-        assert np.array_equal(k, solve_on_lattice(curves, n, budget).k)
+def test_the_same_frame_is_placed_alike_every_time(bench: Bench) -> None:
+    a, b, counts = usual(np.random.default_rng(9), 20_000)
+    budget = int(usable_counts(counts).sum()) // 3
+    first, again = (bench.place(a, b, counts, budget) for _ in range(2))
+    for field in ("cut", "cursor", "offset"):
+        assert np.array_equal(getattr(first, field), getattr(again, field))
 
 
-def test_the_list_holds_the_pixels_that_have_a_choice_once(bench: Bench, ctx: moderngl.Context) -> None:
-    n, _ = usual(np.random.default_rng(2), 3 * BLOCK + 100)
-    occupied = int(np.count_nonzero(n))
-    for budget, least in ((occupied, 1), (occupied - 1, 0)):
-        frame = bench.begin(GpuAllocation(ctx), n, budget)
-        expected = np.flatnonzero(n > least)
-        assert frame.read_state().settled == occupied - len(expected)
-        assert frame.listed is None, "it would be beside what the predictor reads"
-        frame.solve(ctx.buffer(np.ones((len(n), 2), dtype=np.float32)))
-        assert frame.listed is not None
-        listed = np.frombuffer(frame.listed.read(4 * len(expected)), dtype=np.uint32)
-        assert np.array_equal(np.sort(listed), expected)
-
-
-def test_every_pixel_gets_a_thread_also_beyond_the_groups_of_one_dimension(bench: Bench, ctx: moderngl.Context) -> None:
+def test_a_shader_visits_every_pixel_of_more_than_one_row_of_groups(bench: Bench, ctx: moderngl.Context) -> None:
     pixels = 65535 * 64 + 1000
-    frame = bench.begin(GpuAllocation(ctx), np.full(pixels, 2), pixels)
+    allocation = bench.begin(np.ones((pixels, 8), np.uint8), pixels)
     program = ctx.compute_shader(
         """#version 450
         layout(local_size_x = 64) in;
-        layout(std430, binding = 1) buffer Visits { uint visits[]; };
-        layout(std430, binding = 0) buffer State { uint state[]; };
+        layout(std430, binding = 2) buffer Visits { uint visits[]; };
+        uniform uint pixels;
         void main() {
             uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
             uint i = 64u * group + gl_LocalInvocationIndex;
-            if (i < state[3] + 64u) atomicAdd(visits[i], 1u);
+            if (i < pixels) atomicAdd(visits[i], 1u);
         }"""
     )
-    visits = ctx.buffer(np.zeros(pixels + 64, dtype=np.uint32))
-    visits.bind_to_storage_buffer(1)
-    frame.run_pixels(program, 0)
-    seen = np.frombuffer(visits.read(), dtype=np.uint32)
-    assert (seen[:pixels] == 1).all()
-    assert (seen[pixels:] <= 1).all(), "the last group may be partly beyond the pixels"
+    visits = ctx.buffer(np.zeros(pixels, dtype=np.uint32))
+    visits.bind_to_storage_buffer(2)
+    allocation.run_pixels(program)
+    assert (np.frombuffer(visits.read(), dtype=np.uint32) == 1).all()
+    assert allocation.read_state().occupied == pixels
 
 
 def test_the_state_is_laid_out_as_the_shaders_have_it() -> None:
-    assert STATE.itemsize == 4 * (14 + 64)
+    assert STATE.itemsize == 4 * (7 + (1 << HALF_BITS))
     assert STATE.fields is not None
-    assert [STATE.fields[name][1] for name in ("count_groups", "edge")] == [44, 56]
-    assert LAST < 2**21, "indices and their differences are far from 32 bits"
+    assert [STATE.fields[name][1] for name in ("budget", "fragments", "rank", "counted")] == [0, 12, 20, 28]

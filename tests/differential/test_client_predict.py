@@ -14,9 +14,9 @@ from safetensors.numpy import load_file, save_file
 from support.dumps import random_dump
 from support.training import random_weights
 
-from diaphane_client import Predictor, Refused, allocate, fill
-from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
-from renderer.allocation.lattice import curves_of, price, solve_on_lattice
+from diaphane_client import Predictor, Refused, allocate
+from diaphane_client import importance_curve as client_curve
+from renderer.allocation.cuts import events_of, importance_curve, solve_cuts
 from renderer.features import FEATURES, derive, gather
 from schemas.bundle import (
     HEADS,
@@ -36,22 +36,22 @@ pytestmark = pytest.mark.usefixtures("single_thread")
 
 EVERY = [(head, outputs) for head, choices in HEADS.items() for outputs in choices]
 DUMP = random_dump(60, 50, 12, 3)
-ROWS = derive(gather(DUMP))
+ROWS = derive(gather(DUMP, "binned-12"))
 N = DUMP.counts.astype(np.int64)
-BUDGETS = (0, 1, 500, int(np.count_nonzero(N)) - 1, int(np.count_nonzero(N)), int(N.sum()) // 2, int(N.sum()) - 1)
+COUNTS = np.random.default_rng(5).multinomial(N, np.full(12, 1.0 / 12.0)).astype(np.uint8)
+BUDGETS = (0, 1, 500, int(np.count_nonzero(N)), int(N.sum()) // 2, int(N.sum()) - 1, int(N.sum()), 2 * int(N.sum()))
 
 
 def written(folder: Path, weights: Weights) -> Path:
     """A bundle whose forms nobody compared."""
     description = Description(
         name="glass",
-        tail=TailSpec(name="density", g=0.75),
+        tail=TailSpec(name="binned-12", g=0.75),
         metric="display",
-        k_min=1,
         provenance=Provenance(scenes={}, code_version="0", seed=0, machine="test"),
         evaluation={},
     )
-    report = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver="none")
+    report = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, torch_ubo=0.0, driver="none")
     write_bundle(folder, weights, description, ROWS[N > 0], lambda: report)
     return folder
 
@@ -64,7 +64,7 @@ def test_answers_are_those_of_the_bundle(
     folder = written(tmp_path / "b", random_weights(4, names, hidden, head, outputs))
     predictor, bundle = Predictor.load(folder), load_bundle(folder)
     assert predictor.features == names
-    assert (predictor.manifest.outputs, predictor.manifest.tail, predictor.manifest.g) == (outputs, "density", 0.75)
+    assert (predictor.manifest.outputs, predictor.manifest.tail) == (outputs, "binned-12")
     inputs = ROWS[:, bundle.weights.columns]
     expected = bundle.weights.answer(inputs)
     np.testing.assert_allclose(predictor.answer(inputs), expected, rtol=1e-5, atol=1e-5)
@@ -72,73 +72,55 @@ def test_answers_are_those_of_the_bundle(
 
 
 @pytest.mark.parametrize(("head", "outputs"), EVERY)
-def test_counts_are_those_of_the_renderer(head: HeadName, outputs: tuple[OutputName, ...], tmp_path: Path) -> None:
+def test_cuts_are_those_of_the_renderer(head: HeadName, outputs: tuple[OutputName, ...], tmp_path: Path) -> None:
     folder = written(tmp_path / "b", random_weights(4, FEATURES, (32, 16), head, outputs))
     predictor, weights = Predictor.load(folder), load_bundle(folder).weights
     answers = weights.run(ROWS)
-    for budget in (*BUDGETS, int(N.sum()), 2 * int(N.sum())):
-        k = predictor.predict(ROWS, budget, N)
-        assert k.dtype == np.int32
-        assert k.sum() == min(budget, N.sum())
-        np.testing.assert_array_equal(predictor.predict(ROWS, budget), k)  # n read from log_n
-        if head == "importance":
-            expected = budget_fill(answers[:, 0], N, budget, feasible_k_min(N, budget))
-        else:
-            expected = solve_on_lattice(curves_of(answers[:, 0], answers[:, 1]), N, budget).k
+    curve = importance_curve(answers[:, 0]) if head == "importance" else (answers[:, 0], answers[:, 1])
+    events = events_of(*curve, COUNTS)
+    for budget in BUDGETS:
+        found, expected = predictor.predict(ROWS, budget, COUNTS), solve_cuts(events, budget)
+        assert found.cut.dtype == found.k.dtype == np.int32
+        assert found.k.sum() <= budget
+        assert found.complete == (expected.rank is None)
         # Another order of the network's sums may move a pixel at the edge; all others are the same.
-        assert np.count_nonzero(k != expected) <= 2 * max(1, len(N) // 1000)
-        assert np.abs(k - expected).max() <= 1
+        assert np.count_nonzero(found.cut != expected.cut) <= 2 * max(1, len(N) // 1000)
 
 
-counts = st.lists(st.one_of(st.integers(0, 6), st.sampled_from([0, 1, 4096, 70_000])), min_size=1, max_size=12)
+counts = st.lists(st.lists(st.sampled_from([0, 0, 1, 2, 5, 200, 254, 255, 300]), min_size=8, max_size=8), max_size=9)
 gain = st.one_of(st.sampled_from([0.0, -5.0, -1e30, 1e30, np.nan, np.inf]), st.floats(-200.0, 200.0, width=32))
-decay = st.one_of(st.sampled_from([0.5, 0.02, 1e30, np.nan, np.inf]), st.floats(0.03125, 300.0, width=32))
-weight = st.one_of(st.sampled_from([0.0, 1e-30, 1.0]), st.floats(0.0, 1.0, width=32))
-
-
-def drawn(data: st.DataObject, n: np.ndarray, *each: st.SearchStrategy[float]) -> tuple[Any, ...]:
-    occupied, total = int(np.count_nonzero(n)), int(n.sum())
-    edges = {0, 1, max(occupied - 1, 0), occupied, max(total - 1, 0), total, 2 * total}
-    budget = data.draw(st.one_of(st.sampled_from(sorted(edges)), st.integers(0, total + 1)))
-    return *(np.array([data.draw(one) for _ in n], dtype=np.float32) for one in each), budget
+fall = st.one_of(st.sampled_from([0.5, 0.02, 1e30, np.nan, np.inf]), st.floats(0.03125, 300.0, width=32))
 
 
 @settings(max_examples=300, deadline=None)
-@given(counts, st.data())
-def test_allocate_is_the_lattice_to_the_fragment(lists: list[int], data: st.DataObject) -> None:
-    n = np.array(lists)
-    a, b, budget = drawn(data, n, gain, decay)
-    k, log_lambda = allocate(a, b, n, budget)
-    expected = solve_on_lattice(curves_of(a, b), n, budget)
-    np.testing.assert_array_equal(k, expected.k)
-    assert log_lambda == (-np.inf if expected.index is None else -price(expected.index))
-    assert k.sum() == min(budget, np.minimum(n, 60_000).sum())
+@given(counts.filter(bool), st.data())
+def test_allocate_is_the_renderers_to_the_bit(lists: list[list[int]], data: st.DataObject) -> None:
+    given_counts = np.array(lists)
+    a, b = (np.array([data.draw(one) for _ in lists], dtype=np.float32) for one in (gain, fall))
+    events = events_of(a, b, given_counts)
+    usable = int(events.growth.sum())
+    budget = data.draw(st.one_of(st.sampled_from([0, 1, usable, 2 * usable]), st.integers(0, usable + 1)))
+    found, expected = allocate(a, b, given_counts, budget), solve_cuts(events, budget)
+    np.testing.assert_array_equal(found.cut, expected.cut)
+    np.testing.assert_array_equal(found.k, expected.k)
+    assert found.complete == (expected.rank is None)
+    wide = allocate(a.astype(np.float64), b.astype(np.float64), given_counts, budget)
+    np.testing.assert_array_equal(wide.cut, found.cut)
 
 
-@settings(max_examples=300, deadline=None)
-@given(counts, st.data())
-def test_fill_is_the_budget_fill_but_for_ties(lists: list[int], data: st.DataObject) -> None:
-    n = np.minimum(np.array(lists), 60_000)
-    weights, budget = drawn(data, n, weight)
-    k, k_min = fill(weights, n, budget), feasible_k_min(n, budget)
-    expected = budget_fill(weights, n, budget, k_min)
-    assert k.sum() == expected.sum() == min(budget, n.sum())
-    assert (k >= np.minimum(n, k_min)).all()
-    assert (k <= n).all()
-    different = np.flatnonzero(k != expected)
-    shares = np.maximum(k, expected)[different] / np.where(weights[different] > 0.0, weights[different], 1.0)
-    assert len(different) == 0 or np.ptp(shares) <= 1e-12 * shares.max()
+def test_curves_of_importances_are_those_of_the_renderer() -> None:
+    importances = np.array([0.0, 1e-30, 0.1, 0.5, 1.0, np.nan], np.float32)
+    np.testing.assert_array_equal(client_curve(importances), importance_curve(importances))
 
 
-def test_the_exact_search_differs_by_ties_alone() -> None:
+def test_a_frame_of_many_pixels_is_the_renderers_to_the_bit() -> None:
     rng = np.random.default_rng(8)
-    n = rng.integers(0, 30, 20_000)
-    a, b = rng.normal(-8.0, 3.0, n.size).astype(np.float32), rng.uniform(0.02, 3.0, n.size).astype(np.float32)
-    for budget in (int(np.count_nonzero(n)), int(n.sum() * 0.4), int(n.sum() * 0.9)):
-        k, log_lambda = allocate(a, b, n, budget)
-        expected, exact = solve_lambda(a, b, n, budget, feasible_k_min(n, budget))
-        assert abs(log_lambda - exact) < 1e-3  # prices are 2^-11 apart around 10
-        assert np.abs(k - expected).sum() <= n.size // 500
+    frame = np.minimum(rng.poisson(0.4, (50_000, 12)), 255)
+    a, b = rng.normal(-8.0, 3.0, len(frame)).astype(np.float32), rng.uniform(0.02, 3.0, len(frame)).astype(np.float32)
+    for budget in (int(frame.sum() * share) for share in (0.01, 0.4, 0.9)):
+        found, expected = allocate(a, b, frame, budget), solve_cuts(events_of(a, b, frame), budget)
+        np.testing.assert_array_equal(found.cut, expected.cut)
+        assert budget - 10 < found.k.sum() <= budget
 
 
 def test_a_network_that_overflows_still_uses_the_budget(tmp_path: Path) -> None:
@@ -148,7 +130,7 @@ def test_a_network_that_overflows_still_uses_the_budget(tmp_path: Path) -> None:
     predictor = Predictor.load(folder)
     broken = Predictor(predictor.manifest, type(predictor.network)(weights.mean, weights.std, huge, ("a", "b")))
     assert not np.isfinite(broken.answer(ROWS[:, :6])).all()
-    assert broken.predict(ROWS[:, :6], 5000, N).sum() == 5000
+    assert 4990 < broken.predict(ROWS[:, :6], 5000, COUNTS).k.sum() <= 5000
 
 
 @pytest.mark.parametrize(
@@ -188,22 +170,29 @@ def test_a_file_that_is_no_safetensors_is_refused(content: bytes, tmp_path: Path
 
 def test_arguments_that_cannot_be_are_refused(tmp_path: Path) -> None:
     predictor = Predictor.load(written(tmp_path / "b", random_weights(4, FEATURES[1:6], (3,))))
-    rows, n = ROWS[:, 1:6], N
-    with pytest.raises(ValueError, match="give n"):
-        predictor.predict(rows, 100)
+    rows = ROWS[:, 1:6]
     with pytest.raises(ValueError, match="reads 5 columns: optical_depth"):
-        predictor.predict(ROWS, 100, n)
+        predictor.predict(ROWS, 100, COUNTS)
     with pytest.raises(ValueError, match="finite"):
-        predictor.predict(np.where(rows > 0, np.nan, rows), 100, n)
+        predictor.predict(np.where(rows > 0, np.nan, rows), 100, COUNTS)
     with pytest.raises(ValueError, match="one number for each pixel"):
-        predictor.predict(rows, 100, n[1:])
-    for counts_of in (n - 20, n.astype(float), n[None]):
-        with pytest.raises(ValueError, match=r"row of counts|for each pixel"):
-            predictor.predict(rows, 100, counts_of)
+        predictor.predict(rows, 100, COUNTS[1:])
+    for wrong_counts in (N, COUNTS[:, :8], COUNTS[None]):
+        with pytest.raises(ValueError, match="binned-12 has 12 bins"):
+            predictor.predict(rows, 100, wrong_counts)
+    for wrong_counts, why in ((COUNTS.astype(float), "whole numbers"), (COUNTS.astype(int) - 200, "not be negative")):
+        with pytest.raises(ValueError, match=why):
+            predictor.predict(rows, 100, wrong_counts)
     with pytest.raises(ValueError, match="budget must not be negative"):
-        predictor.predict(rows, -1, n)
+        predictor.predict(rows, -1, COUNTS)
     with pytest.raises(ValueError, match="b must be positive"):
-        allocate(np.zeros(2), np.zeros(2), np.ones(2, int), 1)
-    for wrong in (-1.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match="finite and not negative"):
-            fill(np.array([1.0, wrong]), np.ones(2, int), 1)
+        allocate(np.zeros(2), np.zeros(2), np.ones((2, 8), int), 1)
+
+
+def test_a_bundle_of_a_tail_without_bins_is_refused(tmp_path: Path) -> None:
+    folder = written(tmp_path / "b", random_weights(4, FEATURES[1:6], (3,)))
+    manifest = json.loads((folder / MANIFEST).read_text())
+    manifest["tail"]["name"] = "density"
+    (folder / MANIFEST).write_text(json.dumps(manifest))
+    with pytest.raises(Refused, match="the tail 'density' is not one of binned-8"):
+        Predictor.load(folder)

@@ -1,4 +1,4 @@
-"""The frame as docs/CLIENTS.md has it, pass by pass with its bindings and defines, is the picture of `kbuffer-deep`."""
+"""The frame as docs/CLIENTS.md has it, pass by pass with its bindings and defines, is the picture of the techniques."""
 
 from __future__ import annotations
 
@@ -9,26 +9,43 @@ import numpy as np
 import pytest
 from support.training import random_weights
 
+from renderer.bin_pass import TARGETS
 from renderer.features import derive, gather
 from renderer.frame import Frame
+from renderer.gpu_scene import TRANSPARENT
 from renderer.programs import Defines, expand
-from renderer.techniques import Budget, KBufferDeep
-from renderer.techniques.chain import one_pass_available
+from renderer.techniques import Binned, Budget, KBufferDeep
 from schemas.bundle import GLSL, HeadName, OutputName, ParityReport, Provenance, TailSpec
 from schemas.fragments import FragmentDump
+from schemas.tail import TailName
 from trainer.bundle import Description, write_bundle
 
-B = 16
-CONSTANTS: Defines = {
-    "ROOT_SHARE": 0.6,
-    "PLAIN_SHARE": 0.4,
-    "SHARE_LEVELS": 15,
-    "OPTICAL_UNIT": 951,
-    "BIN_LIMIT": 65535,
+KINDS: Defines = {
+    "TAIL_EXACT_COVERAGE": 0,
+    "TAIL_DENSITY": 1,
+    "TAIL_WEIGHTED_AVERAGE": 2,
+    "TAIL_PAPER": 3,
+    "TAIL_BINNED": 4,
 }
-LATTICE: Defines = {"BLOCK": 2048, "EDGES": 64, "LAST": 1884160, "SHIFT": 9, "TURNS": 60000}
-CURVES: Defines = {**LATTICE, "MOST_GAIN": 1.2676506002282294e30, "LEAST_RATE": 3.1554436208840472e-30}
+CONSTANTS: Defines = {
+    **{"TAIL": 4, **KINDS, "MAX_EXPONENT": 60.0, "ROOT_SHARE": 0.6, "PLAIN_SHARE": 0.4, "OPTICAL_UNIT": 951},
+    **{"BIN_LIMIT": 65535, "RANGE_TILE": 8, "LEAST_OTHERS": 0.001, "LEAST_SPREAD": 0.001},
+    **{"LUMA_R": 0.2126, "LUMA_G": 0.7152, "LUMA_B": 0.0722},
+}
+ROWS: dict[TailName, Defines] = {
+    "binned-8": {"BINS": 8, "SHARE_LEVELS": 255, "MEAN_LEVELS": 255},
+    "binned-12": {"BINS": 12, "SHARE_LEVELS": 255, "MEAN_LEVELS": 255},
+    "binned-16": {"BINS": 16, "SHARE_LEVELS": 255, "MEAN_LEVELS": 255},
+    "density-16": {"BINS": 16, "SHARE_LEVELS": 15, "MEAN_LEVELS": 0},
+}
+ALLOCATION: Defines = {"BLOCK": 2048, "HALF_BITS": 11, "DROPPED_BITS": 10, "FULL": 255, "MOST_CORE": 1023}
+LIMITS: Defines = {
+    "MOST_GAIN": 1.152921504606847e18,
+    "LEAST_FALL": 0.000244140625,
+    "MOST_FALL": 1.152921504606847e18,
+}
 ONES = 0xFFFFFFFF
+FOUND, RANGES = 0, 7
 
 
 class Client:
@@ -36,16 +53,18 @@ class Client:
 
     Args:
         frame: The view.
-        predict: The bundle's GLSL.
-        outputs: How many the bundle has.
+        tail: What is rendered.
     """
 
-    def __init__(self, frame: Frame, predict: str, outputs: int) -> None:
+    def __init__(self, frame: Frame, tail: TailName) -> None:
         self.frame, self.ctx = frame, frame.ctx
         self.width, self.height, self.pixels = frame.width, frame.height, frame.pixels
-        self.texts, self.outputs = {"bundle/predict.glsl": predict}, outputs
-        self.groups = self.pixels // 2048 + 1
-        self.state = self.words(312 // 4, 0)  # once
+        self.texts: dict[str, str] = {}
+        self.row = ROWS[tail]
+        self.tail: Defines = {**CONSTANTS, **self.row}
+        self.bins = int(self.row["BINS"])
+        self.size = {"width": self.width, "pixels": self.pixels}
+        self.sixty_fours, self.blocks = -(-self.pixels // 64), -(-self.pixels // 2048)
 
     def words(self, count: int, fill: int) -> moderngl.Buffer:
         return self.ctx.buffer(np.full(max(count, 1), fill, np.uint32))
@@ -57,11 +76,7 @@ class Client:
         return made
 
     def draw(
-        self,
-        fragment: str,
-        targets: list[moderngl.Texture],
-        buffers: dict[int, moderngl.Buffer],
-        defines: Defines | None = None,
+        self, fragment: str, targets: list[moderngl.Texture], buffers: dict[int, moderngl.Buffer], defines: Defines
     ) -> None:
         for binding, buffer in buffers.items():
             buffer.bind_to_storage_buffer(binding)
@@ -69,119 +84,157 @@ class Client:
         self.ctx.memory_barrier()
 
     def run(
-        self, name: str, defines: Defines, buffers: dict[int, moderngl.Buffer], groups: int | None, **uniforms: int
+        self, name: str, defines: Defines, buffers: dict[int, moderngl.Buffer], groups: int, **uniforms: int
     ) -> None:
         program = self.ctx.compute_shader(expand(name, defines, self.texts))
         for binding, buffer in buffers.items():
             buffer.bind_to_storage_buffer(binding)
         for uniform, value in uniforms.items():
-            program[uniform] = value
-        if groups is None:
-            program.run_indirect(self.state, 44)
-        else:
-            program.run(min(groups, 1024), -(-groups // 1024))
+            if uniform in program:
+                program[uniform] = value
+        program.run(min(groups, 1024), -(-groups // 1024))
         self.ctx.memory_barrier()
 
-    def render(self, budget: int, *, one_pass: bool) -> tuple[np.ndarray, np.ndarray]:
-        """The picture, and k of every pixel."""
-        size = {"width": self.width, "pixels": self.pixels}
-        sixty_fours = -(-self.pixels // 64)
-        # 2
-        count, z_min, z_max = (self.words(self.pixels, fill) for fill in (0, ONES, 0))
-        self.draw("count/count.frag", [], {0: count, 1: z_min, 2: z_max}, {"RANGE": 1})
-        # 3
-        binned = [self.texture(1, "f4"), *(self.texture(4, "nu2") for _ in range(B // 4))]
-        defines: Defines = {"BINS": B, **CONSTANTS}
-        self.draw("gather/gather.frag", binned, {1: z_min, 2: z_max}, {**defines, "NEAREST": 0})
-        depth_bins = self.words(self.pixels * (1 + B // 8), 7)
-        for unit, texture in enumerate(binned):
+    def gather(self, *, colours: bool, counts: bool) -> None:
+        """Passes 2 and 3."""
+        columns, rows = -(-self.width // 8), -(-self.height // 8)
+        found = self.ctx.buffer(np.tile(np.array([ONES, 0], np.uint32), columns * rows))
+        self.ranges = self.words(2 * columns * rows, 0)
+        found.bind_to_storage_buffer(FOUND)
+        window = self.ctx.framebuffer([self.ctx.texture((2 * columns, 2 * rows), 1, dtype="f1")])
+        window.use()
+        self.ctx.enable_only(moderngl.NOTHING)
+        scaled = np.array(self.frame.uniforms["projection"], dtype=np.float64).reshape(4, 4)
+        for axis, share in enumerate((self.width / (8 * columns), self.height / (8 * rows))):
+            scaled[:, axis] = share * scaled[:, axis] + (share - 1.0) * scaled[:, 3]
+        uniforms = {**self.frame.uniforms, "projection": tuple(scaled.ravel().tolist()), "width": columns}
+        self.frame.gpu.draw("range/range.frag", TRANSPARENT, uniforms, {"STEPS": 2})
+        self.ctx.memory_barrier()
+        self.run("range/fill.comp", {}, {0: found, 1: self.ranges}, 1, columns=columns, rows=rows)
+
+        self.kept = [self.texture(4, "nu2") for _ in range(self.bins // 4)]
+        means = [self.texture(4, "nu2") for _ in range(self.bins // 4)] if self.row["MEAN_LEVELS"] else []
+        self.sums = [self.texture(4, "f2") for _ in range(2)] if colours else []
+        self.counts = self.words(self.pixels * self.bins // 4, 0)
+        together = len(self.kept) + len(means) + len(self.sums) <= TARGETS
+        passes = [(0, [*self.kept, *means, *self.sums])] if together else [(0, [*self.kept, *means]), (1, self.sums)]
+        for alone, targets in passes:
+            own = {"ALONE": alone, "COLOURS": int(colours and (together or alone)), "COUNTS": int(counts and not alone)}
+            self.draw("gather/bins.frag", targets, {RANGES: self.ranges, 6: self.counts}, {**self.tail, **own})
+        self.frame.target([]).use()
+        for unit, texture in enumerate(self.kept):
+            texture.bind_to_image(unit, read=True, write=True)
+        for unit, texture in enumerate(means):
             texture.use(unit)
-        self.run("gather/pack.comp", defines, {0: depth_bins}, sixty_fours, **size)
-        # 4
-        sums = [self.texture(4, "f2") for _ in range(5)]
-        nearest = self.words(self.pixels, ONES)
-        places: Defines = {f"SUMS{i}": i for i in range(5)}
-        buffers = {1: z_min, 2: z_max, 3: nearest}
-        self.draw("gather/gather.frag", sums, buffers, {**places, "BINS": 0, "NEAREST": 1})
-        # 5
-        blocks, curves = self.words(64 * self.groups, 7), self.words(2 * self.pixels, 7)
-        listed = self.words(self.pixels + 1, 7)
-        allocation = {0: self.state, 1: count, 2: listed, 3: curves, 4: blocks}
-        self.run("allocation/totals.comp", LATTICE, allocation, self.groups, pixels=self.pixels)
-        self.run("allocation/begin.comp", LATTICE, allocation, 1, blocks=self.groups, budget=budget)
-        for unit, texture in enumerate([*sums, self.frame.background]):
+        self.run("gather/pack.comp", self.tail, {}, self.sixty_fours, **self.size)
+
+    def blend(self, fragment: str, buffers: dict[int, moderngl.Buffer]) -> list[moderngl.Texture]:
+        """Pass 4 or 7; the tail's sums."""
+        targets = [self.texture(4, "f4"), self.texture(1, "f4")]
+        for unit, texture in enumerate(self.kept, 3):
             texture.use(unit)
-        buffers = {0: self.state, 1: z_min, 2: z_max, 3: nearest, 5: curves, 6: count, 7: depth_bins}
-        network: Defines = {**CURVES, "MOST_RATE": 4096.0, "TEXELS": 11, "OUTPUTS": self.outputs, **defines}
-        self.run("kbuffer-deep/curves.comp", network, buffers, sixty_fours, **size)
-        # 6
-        self.run("allocation/list.comp", LATTICE, allocation, self.groups, pixels=self.pixels)
-        for _ in range(5):
-            self.run("allocation/count.comp", LATTICE, allocation, None)
-            self.run("allocation/choose.comp", LATTICE, allocation, 1)
-        self.run("allocation/blocks.comp", LATTICE, allocation, self.groups, pixels=self.pixels)
-        self.run("allocation/scan.comp", LATTICE, allocation, 1, blocks=self.groups)
-        self.run("allocation/offsets.comp", LATTICE, allocation, self.groups, pixels=self.pixels)
-        offsets = np.frombuffer(listed.read(), np.uint32).astype(np.int64)
-        # 7
-        tail = {**defines, "TAIL": 4, "MAX_EXPONENT": 60.0}
-        tail_colour = self.texture(4, "f4")
-        buffers = {0: listed, 3: z_min, 4: z_max, 5: depth_bins}
-        slots = self.words((2 if one_pass else 1) * budget, ONES)
-        if one_pass:
-            self.draw("kbuffer/chain.frag", [tail_colour], {**buffers, 2: slots}, tail)
-        else:
-            depths = self.words(budget, ONES)
-            self.draw("kbuffer/chain_depth.frag", [], {0: listed, 1: depths})
-            self.draw("kbuffer/chain_colour.frag", [tail_colour], {**buffers, 1: depths, 2: slots}, tail)
-        # 8
-        final: Defines = {**defines, "TAIL": 4, "STRIDE": 2 if one_pass else 1}
+        self.draw(fragment, targets, {RANGES: self.ranges, **buffers}, self.tail)
+        return targets
+
+    def resolve(
+        self, fragment: str, textures: list[moderngl.Texture], defines: Defines, buffers: dict[int, moderngl.Buffer]
+    ) -> np.ndarray:
+        """Pass 9."""
         program = self.ctx.program(
-            vertex_shader=expand("common/fullscreen.vert", {}),
-            fragment_shader=expand("kbuffer/resolve.frag", final),
+            vertex_shader=expand("common/fullscreen.vert", {}), fragment_shader=expand(fragment, defines)
         )
-        program["width"], program["first_row"] = self.width, 0
-        for binding, buffer in ((0, listed), (2, slots), (5, depth_bins)):
+        for name, value in (("width", self.width), ("first_row", 0)):
+            if name in program:
+                program[name] = value
+        for binding, buffer in buffers.items():
             buffer.bind_to_storage_buffer(binding)
-        self.frame.background.use(0)
-        tail_colour.use(1)
+        for unit, texture in enumerate([self.frame.background, *textures]):
+            texture.use(unit)
         image = self.texture(4, "f4")
         self.ctx.framebuffer([image]).use()
         self.ctx.enable_only(moderngl.NOTHING)
         self.ctx.vertex_array(program, []).render(moderngl.TRIANGLES, vertices=3)
-        linear = np.frombuffer(image.read(), np.float32).reshape(self.height, self.width, 4)
-        return linear[:, :, :3], np.diff(offsets)
+        return np.frombuffer(image.read(), np.float32).reshape(self.height, self.width, 4)[:, :, :3]
+
+    def binned(self) -> np.ndarray:
+        """The picture of `binned`."""
+        self.gather(colours=False, counts=False)
+        return self.resolve("common/weighted_mean.frag", self.blend("binned/tail.frag", {}), {}, {})
+
+    def deep(self, budget: int, predict: str, outputs: int, *, colours: bool) -> tuple[np.ndarray, np.ndarray]:
+        """The picture of `kbuffer-deep`, and k of every pixel."""
+        self.texts = {"bundle/predict.glsl": predict}
+        self.gather(colours=colours, counts=True)
+        # 5
+        state, curves = self.words(8220 // 4, 0), self.words(2 * self.pixels, 7)
+        state.write(np.uint32(budget).tobytes())
+        blocks, offsets = self.words(2 * self.blocks, 7), self.words(self.pixels, 7)
+        shared = {0: state, 1: self.counts, 2: curves, 3: blocks, 4: offsets}
+        defines: Defines = {**ALLOCATION, "BINS": self.bins}
+        numbers = {"pixels": self.pixels, "blocks": self.blocks}
+
+        def allocate(name: str, groups: int, **own: int) -> None:
+            self.run(f"allocation/{name}.comp", {**defines, **own}, shared, groups, **numbers)
+
+        allocate("totals", self.blocks)
+        allocate("choose", 1, STEP=0)
+        for unit, texture in enumerate([self.frame.background, *self.sums]):
+            texture.use(unit)
+        for unit, texture in enumerate(self.kept, 3):
+            texture.use(unit)
+        network: Defines = {"TEXELS": 12, "COLOURS": int(colours), "OUTPUTS": outputs, **self.tail, **defines, **LIMITS}
+        inputs = {0: state, 1: self.counts, 2: curves, RANGES: self.ranges}
+        self.run("kbuffer-deep/curves.comp", network, inputs, self.sixty_fours, **self.size)
+        # 6
+        for low in (0, 1):
+            allocate("count", self.blocks, LOW=low)
+            allocate("choose", 1, STEP=1 + low)
+        allocate("blocks", self.blocks)
+        allocate("scan", 1)
+        allocate("place", self.blocks)
+        # 7, 8, 9
+        pool = self.words(2 * budget, 7)
+        targets = self.blend("kbuffer-deep/capture.frag", {1: self.counts, 2: pool})
+        buffers = {0: offsets, 1: self.counts, 2: pool}
+        self.run("kbuffer-deep/sort.comp", {"BINS": self.bins}, buffers, self.sixty_fours, pixels=self.pixels)
+        final: Defines = {**self.tail, "STRIDE": 2, "CURSOR": self.bins // 4}
+        linear = self.resolve("kbuffer/resolve.frag", targets, final, buffers)
+        ends = np.frombuffer(self.counts.read(), np.uint32).reshape(self.pixels, -1)[:, 1]
+        return linear, (ends - np.frombuffer(offsets.read(), np.uint32)).astype(np.int32)
+
+
+@pytest.mark.parametrize("tail", ROWS)
+def test_the_documents_binned_is_the_technique(ctx: moderngl.Context, frame: Frame, tail: TailName) -> None:
+    expected = Binned(tail).render(frame, Budget(0))
+    np.testing.assert_allclose(Client(frame, tail).binned(), expected.linear, rtol=0.0, atol=1e-6)
 
 
 @pytest.mark.parametrize(
-    ("one_pass", "head", "outputs"),
+    ("tail", "head", "outputs"),
     [
-        (False, "gain-curve", ("a", "b")),
-        (True, "gain-curve", ("a", "b")),
-        (False, "gain-curve", ("a", "b", "g")),
-        (False, "importance", ("importance",)),
+        ("binned-12", "gain-curve", ("a", "b")),
+        ("binned-16", "gain-curve", ("a", "b", "g")),
+        ("density-16", "importance", ("importance",)),
     ],
 )
-def test_the_documents_frame_is_the_technique(
+def test_the_documents_frame_is_kbuffer_deep(
     ctx: moderngl.Context,
     frame: Frame,
     dump: FragmentDump,
     tmp_path: Path,
-    one_pass: bool,
+    tail: TailName,
     head: HeadName,
     outputs: tuple[OutputName, ...],
 ) -> None:
-    if one_pass and not one_pass_available(ctx):
-        pytest.skip("this driver has no 64-bit atomics")
     provenance = Provenance(scenes={}, code_version="0", seed=0, machine="test")
-    described = Description("glass", TailSpec(name="density-16", g=0.75), "display", 1, provenance, {})
-    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver="none")
+    described = Description("glass", TailSpec(name=tail, g=0.75), "display", provenance, {})
+    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, torch_ubo=0.0, driver="none")
     network = random_weights(11, head=head, outputs=outputs)
-    write_bundle(tmp_path, network, described, derive(gather(dump, bins=B)), lambda: parity)
-    deep, client = KBufferDeep(tmp_path), Client(frame, (tmp_path / GLSL).read_text(), len(outputs))
-    for budget in (dump.total // 3, dump.total // 2, 100, dump.total + 5):  # the later ones start warm
-        expected = deep.render(frame, Budget(budget, "density-16", chain="one-pass" if one_pass else "two-pass"))
-        linear, k = client.render(budget, one_pass=one_pass)
+    write_bundle(tmp_path, network, described, derive(gather(dump, tail)), lambda: parity)
+    deep, client = KBufferDeep(tmp_path), Client(frame, tail)
+    for budget in (dump.total // 3, dump.total // 2, 100, dump.total + 5):
+        expected = deep.render(frame, Budget(budget, tail))
+        linear, k = client.deep(budget, (tmp_path / GLSL).read_text(), len(outputs), colours=True)
         np.testing.assert_array_equal(k, expected.k)
-        assert k.sum() == min(budget, dump.total)
+        assert k.sum() <= budget
         np.testing.assert_allclose(linear, expected.linear, rtol=0.0, atol=1e-6)

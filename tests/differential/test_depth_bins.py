@@ -1,186 +1,357 @@
-"""Depth bins on the GPU: what is kept of them, the features that a network reads of it, and the pictures."""
+"""Depth bins on the GPU: where they lie, what is kept of them, fragments by bin, and the features made of it all."""
 
 from __future__ import annotations
 
 import weakref
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import moderngl
 import numpy as np
 import pytest
+from numpy.typing import NDArray
+from support.scenes import SIZE, VIEW, shells
 from support.training import export_random, random_weights
 
+from labeller import reference
 from labeller.curves import composite
-from renderer.depth_bins import place_of
-from renderer.features import FEATURES, SUMS, derive, gather, texels_of
-from renderer.frame import BIN_DEFINES, Frame, front_bytes
+from renderer.allocation.cuts import FULL
+from renderer.bin_pass import Binned
+from renderer.capture import capture
+from renderer.depth_bins import OPTICAL, bin_form, keep_bins, kept_room, place_of
+from renderer.features import COLOUR_SUMS, FEATURES, SUMS, derive, gather
+from renderer.frame import Frame
+from renderer.gpu_scene import GpuScene
 from renderer.programs import expand
 from renderer.techniques import KBufferDeep, technique
 from renderer.techniques.base import Budget
-from schemas.colour import display8
+from renderer.tile_range import pixel_ranges, tile_grid, tile_ranges
 from schemas.fragments import FragmentDump
 from schemas.limits import LIMITS
 from schemas.problem import Problem
-from schemas.tail import DENSITY_BINS, SHARE_LEVELS, TailName
+from schemas.tail import BINNED_TAILS, RANGE_TILE, TAILS, Tail, TailName
 
-BINNED = sorted(DENSITY_BINS)
-FRONT = SUMS.index("front_1")
-READ = ("log_n", "optical_depth", "rgb_nearest_g", *(name for name in FEATURES if name.startswith("front_")))
+SIZES = [(160, 120), (61, 45), (8, 8), (7, 5), (1, 1), (130, 3)]
+"""The shared frame's, and such as are not whole tiles."""
+AWAY = VIEW.model_copy(update={"target": (VIEW.eye[0], VIEW.eye[1], 2.0 * VIEW.eye[2])})
+"""A view of nothing."""
+NO_COLOURS = tuple(name for name in FEATURES if not name.startswith(("rgb_", "luma_", "depth_mean")))
 
 
-@pytest.mark.parametrize("bins", DENSITY_BINS.values())
-@pytest.mark.parametrize("texels", [frozenset[int](), frozenset({1, 5}), frozenset(range(6))])
-def test_what_is_kept_of_the_bins_is_what_the_dump_says(
-    frame: Frame, dump: FragmentDump, bins: int, texels: frozenset[int]
+@pytest.fixture(scope="module")
+def gpu(gl: moderngl.Context) -> GpuScene:
+    return GpuScene(gl, shells())
+
+
+def words_of(binned: Binned) -> NDArray[np.int64]:
+    """int64 [P, B], what is kept of the bins."""
+    fours = [np.frombuffer(texture.read(), dtype=np.uint16).reshape(-1, 4) for texture in binned.kept]
+    return np.concatenate(fours, axis=1).astype(np.int64)
+
+
+def counts_of(binned: Binned, pixels: int) -> NDArray[np.int64]:
+    """int64 [P, B], fragments of the bins as they were counted."""
+    assert binned.counts is not None
+    read = np.frombuffer(binned.counts.read(binned.tail.bins * pixels), dtype=np.uint8)
+    return read.reshape(pixels, binned.tail.bins).astype(np.int64)
+
+
+def expected_words(dump: FragmentDump, tail: Tail) -> NDArray[np.int64]:
+    """The same of a dump, by the compiled account."""
+    ranges, kept, form = pixel_ranges(dump), kept_room(), bin_form(tail)
+    words = np.zeros((dump.pixels, tail.bins), dtype=np.int64)
+    for p in np.flatnonzero(dump.counts):
+        part = slice(dump.offsets[p], dump.offsets[p + 1])
+        units = keep_bins(form, dump.depth[part], dump.rgba[part], ranges.nearest[p], ranges.extent[p], kept)
+        shares = np.rint(tail.share_levels * kept.front[1 : tail.bins]).astype(np.int64)
+        means = np.rint(tail.mean_levels * kept.mean[: tail.bins - 1]).astype(np.int64)
+        words[p, :-1] = shares << 8 | means
+        words[p, -1] = int(units)
+    return words
+
+
+def plain_words(dump: FragmentDump, p: int, tail: Tail) -> list[int]:
+    """The same of one pixel, by the plain account."""
+    pixel = reference.pixel_of(dump, p)
+    found = reference.depth_bins(pixel, OPTICAL[np.rint(255.0 * pixel.alpha).astype(int)], tail)
+    shares = [round(tail.share_levels * share) for share in found.front[1 : tail.bins]]
+    means = [round(tail.mean_levels * mean) for mean in found.mean[: tail.bins - 1]]
+    return [*(share << 8 | mean for share, mean in zip(shares, means, strict=True)), found.units]
+
+
+def bins_of(dump: FragmentDump, tail: Tail) -> NDArray[np.int64]:
+    """int64 [N], the bin of every fragment."""
+    ranges, pixel = pixel_ranges(dump), np.repeat(np.arange(dump.pixels), dump.counts)
+    places = [
+        place_of(z, low, extent, tail.bins)
+        for z, low, extent in zip(dump.depth, ranges.nearest[pixel], ranges.extent[pixel], strict=True)
+    ]
+    return np.minimum(np.array(places, dtype=np.float32).astype(np.int64), tail.bins - 1)
+
+
+def counted(dump: FragmentDump, tail: Tail) -> NDArray[np.int64]:
+    """int64 [P, B], fragments of each bin; FULL for that many or more."""
+    pixel = np.repeat(np.arange(dump.pixels), dump.counts)
+    found = np.zeros((dump.pixels, tail.bins), dtype=np.int64)
+    np.add.at(found, (pixel, bins_of(dump, tail)), 1)
+    return np.minimum(found, FULL)
+
+
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_what_is_kept_of_the_bins_is_what_the_dump_says(gpu: GpuScene, tail: TailName, size: tuple[int, int]) -> None:
+    frame = Frame(gpu, VIEW, *size)
+    dump, row = capture(frame).dump, TAILS[tail]
+    words = words_of(frame.gather_bins(tail))
+    assert np.array_equal(words, expected_words(dump, row))
+    some = np.random.default_rng(1).choice(np.flatnonzero(dump.counts), min(40, np.count_nonzero(dump.counts)), False)
+    assert [words[p].tolist() for p in some] == [plain_words(dump, p, row) for p in some]
+
+
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+@pytest.mark.parametrize("size", [(61, 45), (7, 5)], ids=str)
+def test_fragments_are_counted_by_bin(gpu: GpuScene, tail: TailName, size: tuple[int, int]) -> None:
+    frame = Frame(gpu, VIEW, *size)
+    dump = capture(frame).dump
+    for colours in (False, True):
+        binned = frame.gather_bins(tail, colours=colours, counts=True)
+        assert np.array_equal(counts_of(binned, dump.pixels), counted(dump, TAILS[tail]))
+        assert np.array_equal(words_of(binned), expected_words(dump, TAILS[tail])), "whatever is gathered beside them"
+
+
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+def test_what_is_kept_is_the_same_from_run_to_run(gpu: GpuScene, tail: TailName) -> None:
+    first, again = (Frame(gpu, VIEW, *SIZE).gather_bins(tail, counts=True) for _ in range(2))
+    assert np.array_equal(words_of(first), words_of(again))
+    pixels = SIZE[0] * SIZE[1]
+    assert np.array_equal(counts_of(first, pixels), counts_of(again, pixels))
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_ranges_are_of_the_picture_s_tiles_and_hold_most_of_their_fragments(
+    gpu: GpuScene, size: tuple[int, int]
 ) -> None:
-    gathered = frame.gather("gather", texels, bins)
-    assert gathered.front is not None
-    words = np.frombuffer(gathered.front.read(), np.uint32)[: dump.pixels * front_bytes(bins) // 4]
-    words = words.reshape(dump.pixels, -1)
-    expected = gather(dump, bins)
-    np.testing.assert_allclose(
-        words[:, 0].view(np.float32), expected[:, SUMS.index("optical_depth")], rtol=1e-5, atol=1e-6
-    )
-    every = 16 // bins
-    for b in range(1, bins):
-        share = words[:, 1 + (b - 1) // 8] >> np.uint32(4 * ((b - 1) % 8)) & 15
-        np.testing.assert_array_equal(share, np.rint(SHARE_LEVELS * expected[:, FRONT - 1 + every * b]))
+    dump = capture(Frame(gpu, VIEW, *size)).dump
+    columns, rows = tile_grid(*size)
+    assert dump.tile_range is not None
+    assert dump.tile_range.shape == (columns * rows, 2)
+    assert (dump.tile_range[:, 0] <= dump.tile_range[:, 1]).all()
+    ranges, pixel = pixel_ranges(dump), np.repeat(np.arange(dump.pixels), dump.counts)
+    x, y = np.arange(dump.pixels) % size[0], np.arange(dump.pixels) // size[0]
+    own = dump.tile_range[y // RANGE_TILE * columns + x // RANGE_TILE]
+    assert np.array_equal(ranges.nearest, own[:, 0])
+    assert np.array_equal(ranges.extent, own[:, 1] - own[:, 0])
+    if size == SIZE:
+        inside = (dump.depth >= own[pixel, 0]) & (dump.depth <= own[pixel, 1])
+        assert inside.mean() > 0.95, "an estimate from one pixel of sixteen"
 
 
-@pytest.mark.parametrize("tail", BINNED)
-def test_a_network_reads_the_bins_and_the_picture_is_as_simulated(
-    frame: Frame, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, tail: TailName
+def test_without_a_fragment_there_are_no_ranges_and_the_picture_is_the_background(gpu: GpuScene) -> None:
+    frame = Frame(gpu, AWAY, 61, 45)
+    dump = capture(frame).dump
+    assert dump.total == 0
+    assert not tile_ranges(dump).any()
+    for tail in BINNED_TAILS:
+        binned = frame.gather_bins(tail, colours=True, counts=True)
+        assert not words_of(binned).any()
+        assert not counts_of(binned, dump.pixels).any()
+    exact = composite(dump, dump.counts).reshape(45, 61, 3)
+    for name in ("binned", "kbuffer", "kbuffer-importance"):
+        np.testing.assert_allclose(technique(name).render(frame, Budget(10)).linear, exact, atol=1e-6, rtol=0)
+
+
+@pytest.mark.parametrize(("away", "met"), [(12.0, True), (60.0, False)])
+def test_a_tile_whose_samples_meet_no_surface_has_its_neighbours_range_or_the_view_s(
+    gpu: GpuScene, away: float, met: bool
 ) -> None:
-    network = random_weights(11, READ)
-    sums = gather(dump, DENSITY_BINS[tail])
-    export_random(tmp_path, network, derive(sums)[dump.counts > 0], gl, tail)
-    deep = KBufferDeep(tmp_path)
-    pixels = np.flatnonzero(dump.counts > 1).astype(np.uint32)
-    np.testing.assert_allclose(
-        deep.features(frame, pixels), derive(sums)[pixels][:, network.columns], rtol=1e-5, atol=1e-5
-    )
-    for inference in ("glsl", "onnx"):
-        rendered = KBufferDeep(tmp_path, inference).render(frame, Budget(dump.total // 3, tail))
-        assert rendered.captured == dump.total // 3
-        simulated = composite(dump, rendered.k, tail).reshape(*rendered.linear.shape)
-        assert np.abs(display8(rendered.linear).astype(int) - display8(simulated).astype(int)).max() <= 1
+    """Far away, some samples or none meet the scene: in a tile without, what others found stands for it."""
+    view = VIEW.model_copy(update={"eye": tuple(away * x for x in VIEW.eye)})
+    frame = Frame(gpu, view, *SIZE)
+    dump = capture(frame).dump
+    assert dump.total > 0
+    assert dump.tile_range is not None
+    occupied = np.flatnonzero(dump.counts)
+    columns, _ = tile_grid(*SIZE)
+    tiles = set((occupied // SIZE[0] // RANGE_TILE * columns + occupied % SIZE[0] // RANGE_TILE).tolist())
+    assert (dump.tile_range[:, 1] > 0.0).all() == met
+    assert dump.tile_range.any() == met
+    assert len(tiles) < len(dump.tile_range) / 10
+    for tail in BINNED_TAILS:
+        assert np.array_equal(words_of(frame.gather_bins(tail)), expected_words(dump, TAILS[tail]))
 
 
-@pytest.mark.parametrize("tail", BINNED)
-def test_a_bundle_can_be_rendered_with_another_tail_than_its_own(
-    frame: Frame, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, tail: TailName
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+@pytest.mark.parametrize("given", ["none", "nearer", "farther", "narrow", "one depth", "turned round", "zero"])
+def test_with_any_ranges_the_picture_is_as_simulated(
+    gpu: GpuScene, monkeypatch: pytest.MonkeyPatch, tail: TailName, given: str
 ) -> None:
-    features = derive(gather(dump, DENSITY_BINS[tail]))[dump.counts > 0]
-    export_random(tmp_path, random_weights(11, READ), features, gl, tail)
-    for other in ("density", "paper", *(b for b in BINNED if b != tail)):
-        rendered = KBufferDeep(tmp_path).render(frame, Budget(dump.total // 3, other))
-        simulated = composite(dump, rendered.k, other).reshape(*rendered.linear.shape)
-        assert np.abs(display8(rendered.linear).astype(int) - display8(simulated).astype(int)).max() <= 1
+    """A wrong range costs quality and never correctness: what lies outside of it counts as at its end."""
+    size = (61, 45)
+    plain = capture(Frame(gpu, VIEW, *size)).dump
+    assert plain.tile_range is not None
+    own = tile_ranges(replace(plain, tile_range=None))
+    low, high = own.T
+    ranges = {
+        "none": own,
+        "nearer": 0.25 * own,
+        "farther": 4.0 * own,
+        "narrow": np.stack([0.6 * low + 0.4 * high, 0.4 * low + 0.6 * high], axis=1),
+        "one depth": np.stack([high, high], axis=1),
+        "turned round": own[:, ::-1],
+        "zero": np.zeros_like(own),
+    }[given]
+    ranges = np.ascontiguousarray(ranges, dtype=np.float32)
+    frame = Frame(gpu, VIEW, *size)
+    monkeypatch.setattr(Frame, "_estimated_range", lambda self: self.ctx.buffer(ranges))
+    dump = replace(plain, tile_range=None if given == "none" else ranges)
+    binned = frame.gather_bins(tail, counts=True)
+    assert np.array_equal(words_of(binned), expected_words(dump, TAILS[tail]))
+    assert np.array_equal(counts_of(binned, dump.pixels), counted(dump, TAILS[tail]))
+    rendered = technique("kbuffer").render(frame, Budget(2 * dump.pixels, tail))
+    simulated = composite(dump, rendered.k, tail).reshape(rendered.linear.shape)
+    np.testing.assert_allclose(rendered.linear, simulated, atol=3e-6, rtol=0)
 
 
-@pytest.mark.parametrize("bins", DENSITY_BINS.values())
-def test_places_are_the_same_to_the_bit(ctx: moderngl.Context, tmp_path: Path, bins: int) -> None:
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+def test_places_are_the_same_to_the_bit(ctx: moderngl.Context, tail: TailName) -> None:
     """A place that is one unit in the last place off is, once in a million pixels, in another bin."""
     rng = np.random.default_rng(3)
-    count = 64 * 4000
+    count, row = 64 * 1000, TAILS[tail]
     nearest = rng.uniform(0.1, 50.0, count).astype(np.float32)
-    extent = (nearest + rng.choice([1e-5, 1e-2, 0.1, 1.0, 30.0], count).astype(np.float32)) - nearest
-    z = np.minimum(nearest + extent * rng.uniform(0.0, 1.0, count).astype(np.float32), nearest + extent)
+    extent = (nearest + rng.choice([0.0, 1e-5, 1e-2, 0.1, 1.0, 30.0], count).astype(np.float32)) - nearest
+    z = nearest + extent * rng.uniform(-0.1, 1.1, count).astype(np.float32)
     text = """
     layout(local_size_x = 64) in;
     layout(std430, binding = 0) readonly buffer In { float given[]; };
     layout(std430, binding = 1) writeonly buffer Out { float place[]; };
     void main() {
         uint i = gl_GlobalInvocationID.x;
-        place[i] = bin_place(given[3u * i], given[3u * i + 1u], given[3u * i + 2u]);
+        place[i] = bin_place(given[3u * i], vec2(given[3u * i + 1u], given[3u * i + 2u]));
     }"""
-    program = ctx.compute_shader(expand("common/depth_bins.glsl", {"BINS": bins, **BIN_DEFINES}) + text)
+    program = ctx.compute_shader(expand("common/depth_bins.glsl", row.defines) + text)
     given, out = ctx.buffer(np.stack([z, nearest, extent], axis=1)), ctx.buffer(reserve=4 * count)
     given.bind_to_storage_buffer(0)
     out.bind_to_storage_buffer(1)
     program.run(count // 64)
     found = np.frombuffer(out.read(), np.float32)
-    expected = np.array([place_of(*each, bins) for each in zip(z, nearest, extent, strict=True)], np.float32)
+    expected = np.array([place_of(*each, row.bins) for each in zip(z, nearest, extent, strict=True)], np.float32)
     assert np.array_equal(found, expected)
 
 
-@pytest.mark.parametrize("bins", DENSITY_BINS.values())
-def test_beside_bins_sums_are_half_floats(frame: Frame, dump: FragmentDump, bins: int) -> None:
-    gathered = frame.gather("gather", frozenset(range(6)), bins)
-    expected = gather(dump, bins)
-    for texel, texture in enumerate(gathered.sums):
-        assert texture.dtype == "f2"
-        found = np.frombuffer(texture.read(), np.float16).reshape(-1, 4)[:, :3].astype(np.float64)
-        truth = expected[:, 4 * texel : 4 * texel + 3]
-        # Each of the n additions, and what is added, is cut to 11 bits.
-        assert (np.abs(found - truth) <= (dump.counts[:, None] + 2) * np.abs(truth) * 2.0**-10 + 1e-6).all()
-    sums, binning = 5 * 8 + 4 + front_bytes(bins), 2 * bins + 4 + front_bytes(bins)
-    assert gathered.pass_bytes == max(sums, binning), "the one is gone when the other is gathered"
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+def test_sums_of_colours_are_those_of_the_dump_in_half_floats(frame: Frame, dump: FragmentDump, tail: TailName) -> None:
+    binned = frame.gather_bins(tail, colours=True)
+    expected = gather(dump, tail)[:, [SUMS.index(name) for name in COLOUR_SUMS]]
+    assert [texture.dtype for texture in binned.colours] == ["f2", "f2"]
+    halves = [np.frombuffer(texture.read(), np.float16).reshape(-1, 4) for texture in binned.colours]
+    found = np.concatenate(halves, axis=1).astype(np.float64)
+    # Each of the n additions, and what is added, is cut to 11 bits.
+    assert (np.abs(found - expected) <= (dump.counts[:, None] + 2) * np.abs(expected) * 2.0**-10 + 1e-6).all()
 
 
-def test_the_targets_of_the_bins_are_gone_when_they_are_packed(
-    frame: Frame, monkeypatch: pytest.MonkeyPatch, ctx: moderngl.Context
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+@pytest.mark.parametrize("names", [FEATURES, NO_COLOURS], ids=["all", "no colours"])
+def test_a_network_reads_what_the_dump_says(
+    frame: Frame, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, tail: TailName, names: tuple[str, ...]
 ) -> None:
-    fresh = Frame(frame.gpu, frame.view, frame.width, frame.height)
+    network, features = random_weights(11, names), derive(gather(dump, tail))
+    export_random(tmp_path, network, features[dump.counts > 0], gl, tail)
+    deep, pixels = KBufferDeep(tmp_path), np.flatnonzero(dump.counts).astype(np.uint32)
+    found, expected = deep.features(frame, pixels), features[pixels][:, network.columns]
+    reads_sums = np.array([name.startswith(("rgb_", "luma_", "depth_mean")) for name in names])
+    np.testing.assert_allclose(found[:, ~reads_sums], expected[:, ~reads_sums], rtol=1e-5, atol=1e-5)
+    # Of sums of half floats: as many roundings as there are fragments.
+    near = 2.0**-9 * (dump.counts[pixels, None] + 2)
+    spread = np.array(["_std" in name for name in names])[reads_sums]
+    one, two = found[:, reads_sums].astype(np.float64), expected[:, reads_sums].astype(np.float64)
+    apart = np.abs(np.where(spread, one**2 - two**2, one - two))
+    assert (apart <= near).all()
+
+
+def test_the_textures_that_only_gathering_needs_are_gone_after_it(
+    gpu: GpuScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frame = Frame(gpu, VIEW, *SIZE)
     made: list[weakref.ref[moderngl.Texture]] = []
-
-    def watched(bins: int) -> list[moderngl.Texture]:
-        found = Frame._bin_targets(fresh, bins)
-        made.extend(weakref.ref(texture) for texture in found)
-        return found
-
-    monkeypatch.setattr(fresh, "_bin_targets", watched)
-    fresh.gather("gather-tail", bins=16)
-    assert len(made) == 5
-    assert all(texture() is None for texture in made), "what is bound is kept, beside the pool"
-
-
-def test_the_targets_of_the_bins_are_gone_when_sums_are_made(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
-    fresh = Frame(frame.gpu, frame.view, frame.width, frame.height)
-    made: list[weakref.ref[moderngl.Texture]] = []
-    alive: list[int] = []
-    make = fresh._zero_targets
+    make = frame.targets
 
     def watched(count: int, dtype: str) -> list[moderngl.Texture]:
-        alive.append(sum(texture() is not None for texture in made))
         found = make(count, dtype)
         made.extend(weakref.ref(texture) for texture in found)
         return found
 
-    monkeypatch.setattr(fresh, "_zero_targets", watched)
-    fresh.gather("gather", frozenset({1, 3, 5}), 16)
-    assert len(made) == 4 + 2
-    assert alive == [0, 0]
+    monkeypatch.setattr(frame, "targets", watched)
+    binned = frame.gather_bins("binned-12", colours=True)
+    assert len(made) == 3 + 3 + 2
+    alive = [texture() for texture in made]
+    assert alive == [*binned.kept, None, None, None, *binned.colours], "what is bound is kept, beside the pool"
+
+
+class Sizes:
+    """Bytes of all that a frame makes, by textures' and buffers' own say."""
+
+    def __init__(self, frame: Frame, patch: pytest.MonkeyPatch) -> None:
+        self.textures: list[moderngl.Texture] = []
+        self.buffers: list[moderngl.Buffer] = []
+        for name, kept in (("targets", self.textures), ("float_targets", self.textures), ("buffer", self.buffers)):
+            patch.setattr(frame, name, self._watched(getattr(frame, name), kept))
+
+    @staticmethod
+    def _watched(make: Callable[..., Any], kept: list[Any]) -> Callable[..., Any]:
+        def made(*args: object) -> Any:
+            found = make(*args)
+            kept.extend(found if isinstance(found, list) else [found])
+            return found
+
+        return made
+
+    @property
+    def bytes(self) -> int:
+        widths = {"nu2": 2, "f2": 2, "f4": 4}
+        textures = sum(t.width * t.height * t.components * widths[t.dtype] for t in self.textures)
+        return textures + sum(b.size for b in self.buffers)
+
+
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+@pytest.mark.parametrize(("colours", "counts"), [(False, False), (True, False), (False, True), (True, True)])
+def test_what_gathering_says_it_needs_is_what_is_allocated(
+    gpu: GpuScene, monkeypatch: pytest.MonkeyPatch, tail: TailName, colours: bool, counts: bool
+) -> None:
+    frame = Frame(gpu, VIEW, *SIZE)
+    frame.tile_range()
+    sizes = Sizes(frame, monkeypatch)
+    binned = frame.gather_bins(tail, colours=colours, counts=counts)
+    assert binned.gathered_bytes * frame.pixels == sizes.bytes
+    kept = sum(t.width * t.height * t.components * 2 for t in [*binned.kept, *binned.colours])
+    assert binned.kept_bytes * frame.pixels == kept + (binned.counts.size if binned.counts else 0)
+
+
+def test_ranges_are_an_eighth_of_a_byte_a_pixel(gpu: GpuScene) -> None:
+    frame = Frame(gpu, VIEW, *SIZE)
+    assert frame.tile_range().size == frame.pixels // 8
 
 
 @pytest.mark.parametrize("name", ["kbuffer-dynamic", "kbuffer-importance"])
-def test_the_peak_of_a_small_pool_is_the_gather_pass(frame: Frame, dump: FragmentDump, name: str) -> None:
-    few = technique(name).render(frame, Budget(dump.pixels // 2, "density-16"))
-    gathering = 12 + (2 * 16 + 4) + front_bytes(16)
-    assert few.early_bytes == gathering
-    assert few.total_bytes == gathering * dump.pixels
-    many = technique(name).render(frame, Budget(dump.total - 1, "density-16"))
-    assert many.pool_bytes > 16 * dump.pixels
-    assert many.pixel_bytes == 4 + 12 + 16 + front_bytes(16)
-    assert many.total_bytes == many.pool_bytes + many.pixel_bytes * dump.pixels > gathering * dump.pixels
-
-
-def test_beside_what_a_runtime_on_the_cpu_reads_back_the_peak_has_its_sums(
-    frame: Frame, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+def test_the_peak_of_a_small_pool_is_the_gather_pass(
+    frame: Frame, dump: FragmentDump, name: str, tail: TailName
 ) -> None:
-    export_random(tmp_path, random_weights(11), derive(gather(dump, 16))[dump.counts > 0], gl, "density-16")
-    rendered = KBufferDeep(tmp_path, "onnx").render(frame, Budget(dump.pixels // 2))
-    opened = int(np.count_nonzero(dump.counts > 1))
-    sums = frame.gather("gather", texels_of(FEATURES, binned=True), 16).pixel_bytes
-    reading = (12 + sums) * dump.pixels + 4 * (1 + len(FEATURES)) * opened
-    assert reading <= rendered.total_bytes < reading + 2 * dump.pixels
+    row = TAILS[tail]
+    few = technique(name).render(frame, Budget(dump.pixels // 4, tail))
+    assert few.early_bytes == 12 + max(row.gathered_bytes, 4 if name == "kbuffer-importance" else 0)
+    assert few.pixel_bytes == 4 + 12 + row.kept_bytes + row.sum_bytes
+    many = technique(name).render(frame, Budget(dump.total - 1, tail))
+    assert many.pool_bytes > 16 * dump.pixels
+    assert many.total_bytes == many.pool_bytes + many.pixel_bytes * dump.pixels > few.total_bytes
 
 
 def test_curves_beyond_a_storage_buffer_are_refused(
     frame: Frame, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    export_random(tmp_path, random_weights(11, FEATURES[:5]), derive(gather(dump))[dump.counts > 0], gl, "density")
-    monkeypatch.setattr("renderer.frame.LIMITS", replace(LIMITS, buffer_bytes=6 * dump.pixels))
+    features = derive(gather(dump, "binned-12"))[dump.counts > 0]
+    export_random(tmp_path, random_weights(11, FEATURES[:2]), features, gl)
+    monkeypatch.setattr("renderer.frame.LIMITS", replace(LIMITS, buffer_bytes=7 * dump.pixels))
     with pytest.raises(Problem, match="above the limit"):
-        KBufferDeep(tmp_path).render(frame, Budget(dump.pixels, "density"))
+        KBufferDeep(tmp_path).render(Frame(frame.gpu, VIEW, *SIZE), Budget(dump.pixels))

@@ -119,7 +119,7 @@ def test_the_cases_are_what_they_are_called(gpus: dict[str, GpuScene]) -> None:
     assert np.array_equal(repeated.rgba[::2], repeated.rgba[1::2])
 
 
-@pytest.mark.parametrize("name", [name for name in EXACT if name != "sbuffer"])
+@pytest.mark.parametrize("name", list(EXACT))
 def test_bands_of_rows_give_the_same_picture(
     name: str, gpus: dict[str, GpuScene], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -130,7 +130,7 @@ def test_bands_of_rows_give_the_same_picture(
     monkeypatch.setattr("renderer.techniques.bands.LIMITS", Limits(buffer_bytes=largest))
     drawn = count_draws(frame, monkeypatch)
     banded = technique.render(frame, Budget(0))
-    assert len({scissor for _, scissor in drawn}) > 2
+    assert len({scissor for _, scissor in drawn} - {None}) > 2
     assert np.array_equal(banded.linear, whole.linear)
     assert banded.total_bytes == whole.total_bytes
 
@@ -144,6 +144,22 @@ def test_a_sort_in_many_dispatches_gives_the_same_picture(
     whole = technique.render(frame, Budget(0)).linear
     monkeypatch.setattr(f"renderer.techniques.{name.replace('-', '_')}.TURNS", 1500)
     assert np.array_equal(technique.render(frame, Budget(0)).linear, whole)
+
+
+@pytest.mark.parametrize("layers", [1, 4, 5, 8, 9, 16, 17, 64, 65, 255, 256, 257, 700])
+def test_the_sbuffer_sorts_runs_of_every_class(gl: moderngl.Context, gpus: dict[str, GpuScene], layers: int) -> None:
+    rng = np.random.default_rng(layers)
+    some = {"apart": stacks.extreme_stacks(layers)["any alpha"], "ties": stacks.awkward_stacks(layers)["three depths"]}
+    some["shorter"] = stacks.Stack(rng.uniform(10.0, 20.0, 1 + layers // 3), rng.integers(1, 255, 1 + layers // 3))
+    gpu = GpuScene(gl, stacks.stack_scene(some))
+    gpu.programs = gpus["ties"].programs
+    frame = Frame(gpu, stacks.VIEW, *stacks.size(len(some)))
+    truth = exact.picture(capture(frame).dump).reshape(frame.height, frame.width, 3)
+    rendered = SBuffer().render(frame, Budget(0))
+    assert rendered.k.max() == layers
+    np.testing.assert_allclose(rendered.linear, truth, atol=1e-6, rtol=0)
+    # Composited in another order, as where two fragments are exchanged, the last bits differ.
+    assert np.array_equal(rendered.linear, ABufferList().render(frame, Budget(0)).linear)
 
 
 def test_more_fragments_than_a_shader_can_order_are_a_problem(
@@ -172,10 +188,9 @@ def test_peeling_needs_a_geometry_pass_a_fragment_at_most(
     name: str, passes: int, gpus: dict[str, GpuScene], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     frame = frame_of(gpus, "many")  # one of its stacks is all ties: the worst case
-    frame.count()
     drawn = count_draws(frame, monkeypatch)
     EXACT[name][0].render(frame, Budget(0))
-    assert len(drawn) <= passes
+    assert len([fragment for fragment, _ in drawn if fragment == f"{name}/peel.frag"]) <= passes
 
 
 def test_dual_peeling_needs_half_the_passes_without_ties(
@@ -187,11 +202,10 @@ def test_dual_peeling_needs_half_the_passes_without_ties(
     passes = {}
     for name in PEELING:
         frame = Frame(gpu, stacks.VIEW, *stacks.size(1))
-        frame.count()
         with monkeypatch.context() as patch:
             drawn = count_draws(frame, patch)
             EXACT[name][0].render(frame, Budget(0))
-        passes[name] = len(drawn)
+        passes[name] = len([fragment for fragment, _ in drawn if fragment == f"{name}/peel.frag"])
     assert passes == {"depth-peeling": 11, "dual-depth-peeling": 6}
 
 
@@ -203,6 +217,7 @@ def test_costs_are_reported_as_they_are(gpus: dict[str, GpuScene]) -> None:
     for name, one in rendered.items():
         assert one.captured == total, name
         assert np.array_equal(one.k, n), name
+        assert one.compared_bytes == one.total_bytes, name
     pools = {name: one.pool_bytes for name, one in rendered.items()}
     assert pools == {
         "abuffer-list": 12 * total,
@@ -211,10 +226,19 @@ def test_costs_are_reported_as_they_are(gpus: dict[str, GpuScene]) -> None:
         "depth-peeling": 0,
         "dual-depth-peeling": 0,
     }
+    pixels = {name: one.pixel_bytes for name, one in rendered.items()}
+    assert pixels == {
+        "abuffer-list": 8,
+        "abuffer-array": 4,
+        "sbuffer": 4,
+        "depth-peeling": 20,
+        "dual-depth-peeling": 52,
+    }
+    assert list(rendered["sbuffer"].passes) == ["opaque", "count", "prefix", "capture", "resolve"]
     assert list(rendered["abuffer-list"].passes) == ["opaque", "count", "list", "sort", "resolve"]
     assert list(rendered["abuffer-array"].passes) == ["opaque", "count", "array", "sort", "resolve"]
     for name in PEELING:
-        assert list(rendered[name].passes) == ["opaque", "count", "start", "peel", "step", "resolve"]
+        assert list(rendered[name].passes) == ["opaque", "count", "peel", "step", "resolve"]
 
 
 def count_draws(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, object]]:

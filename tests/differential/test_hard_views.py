@@ -198,6 +198,5 @@ def test_the_sbuffer_in_bands_of_rows_is_the_same_picture(
     frame, dump = case
     whole = technique("sbuffer").render(frame, Budget(0)).linear
     rows = np.add.reduceat(dump.counts, np.arange(0, dump.pixels, dump.width))
-    monkeypatch.setattr("renderer.techniques.sbuffer.LIMITS", Limits(buffer_bytes=8 * int(rows.max())))
-    monkeypatch.setattr("renderer.techniques.chain.LIMITS", Limits(buffer_bytes=4 * int(rows.max())))
+    monkeypatch.setattr("renderer.techniques.bands.LIMITS", Limits(buffer_bytes=8 * int(rows.max())))
     assert np.array_equal(technique("sbuffer").render(frame, Budget(0)).linear, whole)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from renderer.allocation.fill import budget_fill, feasible_k_min
+from renderer.allocation.fill import budget_fill
 from renderer.allocation.importance import VkbOptions, vkb_importance
 from renderer.frame import Frame
 from renderer.techniques import Budget, KBufferImportance
@@ -43,5 +43,5 @@ def test_the_frame_allocates_as_the_rule_does_on_the_dump(
 ) -> None:
     budget = dump.total // 3
     weights = vkb_importance(dump.counts, dump.facing, dump.width, dump.height, options)
-    expected = budget_fill(weights, dump.counts, budget, feasible_k_min(dump.counts, budget))
+    expected = budget_fill(weights, dump.counts, budget)
     assert np.array_equal(in_frame(frame, dump, options), expected)

@@ -1,4 +1,4 @@
-"""`kbuffer-deep` in the frame against the same network, features and lambda on the CPU."""
+"""`kbuffer-deep` in the frame against the same network, features and cuts on the CPU, and the simulated picture."""
 
 from __future__ import annotations
 
@@ -7,33 +7,50 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from support.scenes import SIZE, VIEW, shells
 from support.training import export_random, random_weights
 
 from labeller.curves import composite
-from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
-from renderer.features import FEATURES, derive, gather, texels_of
+from renderer.allocation.cuts import events_of, importance_curve, solve_cuts, usable_counts
+from renderer.bin_pass import Binned
+from renderer.features import FEATURES, derive, gather
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
-from renderer.techniques import Budget, KBufferDeep
-from renderer.techniques.skips import PREDICTOR, SETTLED_PIXELS, TAIL, UNREAD_SUMS
+from renderer.techniques import Budget, KBufferDeep, Rendered
+from renderer.techniques.skips import PREDICTOR, UNREAD_COLOURS
 from schemas.bundle import HeadName, OutputName
 from schemas.colour import display8
 from schemas.fragments import FragmentDump
+from schemas.problem import ExitCode, Problem
+from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, TAIL_NAMES, TAILS, TailName
 from trainer.weights import Weights
 
+FEW = ("log_n", "optical_depth", "front_3", "mean_2", "depth_extent")
+"""Features that read no colours."""
+SHARES = [0.02, 0.3, 0.9]
 
-@pytest.fixture(scope="module", params=[FEATURES, ("log_n", "optical_depth", "rgb_nearest_g", "depth_std")])
+
+@pytest.fixture(scope="module", params=[FEATURES, FEW], ids=["all features", "no colours"])
 def network(request: pytest.FixtureRequest) -> Weights:
     return random_weights(11, request.param)
 
 
 @pytest.fixture(scope="module")
+def features(dump: FragmentDump) -> NDArray[np.float32]:
+    return derive(gather(dump, DEFAULT_TAIL))
+
+
+@pytest.fixture(scope="module")
 def bundle(
-    network: Weights, dump: FragmentDump, gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory
+    network: Weights,
+    dump: FragmentDump,
+    features: NDArray[np.float32],
+    gl: moderngl.Context,
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> Path:
     folder = tmp_path_factory.mktemp("bundle")
-    export_random(folder, network, derive(gather(dump))[dump.counts > 0], gl)
+    export_random(folder, network, features[dump.counts > 0], gl)
     return folder
 
 
@@ -42,117 +59,143 @@ def deep(bundle: Path) -> KBufferDeep:
     return KBufferDeep(bundle)
 
 
-def test_gain_curves_equal_those_of_the_numpy_network(
-    deep: KBufferDeep, network: Weights, frame: Frame, dump: FragmentDump
-) -> None:
-    pixels = np.flatnonzero(dump.counts > 1).astype(np.uint32)
-    expected = np.stack(network.predict(derive(gather(dump))[pixels]), axis=1)
-    # The spread features cancel in float32, so sums in another order show in the fourth digit of some pixels.
-    difference = np.abs(deep.predict(frame, pixels) - expected) / np.maximum(1.0, np.abs(expected))
-    assert np.quantile(difference, 0.99) < 1e-3
-    assert difference.max() < 5e-2
-
-
-@pytest.mark.parametrize("share", [0.05, 0.3, 0.7])
-def test_budget_is_met_exactly_and_the_picture_is_as_simulated(
-    deep: KBufferDeep, frame: Frame, dump: FragmentDump, share: float
-) -> None:
-    budget = Budget(int(share * dump.total), "density")
-    rendered = deep.render(frame, budget)
-    assert rendered.captured == budget.fragments
-    assert (rendered.k <= dump.counts).all()
-    assert (rendered.k >= np.minimum(dump.counts, feasible_k_min(dump.counts, budget.fragments))).all()
-    simulated = composite(dump, rendered.k, "density", 0.75).reshape(*rendered.linear.shape)
-    assert np.abs(display8(rendered.linear).astype(int) - display8(simulated).astype(int)).max() <= 1
-
-
-def test_counts_are_those_of_the_cpu(deep: KBufferDeep, network: Weights, frame: Frame, dump: FragmentDump) -> None:
-    budget = dump.total // 3
-    n = dump.counts
-    k_min = feasible_k_min(n, budget)
-    expected = np.minimum(n, k_min).astype(np.int32)
-    rows = np.flatnonzero(n > k_min)
-    a, b = network.predict(derive(gather(dump))[rows])
-    left = budget - int(expected.sum()) + k_min * len(rows)
-    expected[rows] = solve_lambda(a, b, n[rows], left, k_min)[0]
-    difference = np.abs(deep.render(frame, Budget(budget)).k - expected)
-    assert (difference == 0).mean() > 0.99
-    assert difference.max() <= 1
-
-
 @pytest.fixture
 def fresh(gl: moderngl.Context) -> Frame:
     """A frame of which nothing is known yet."""
     return Frame(GpuScene(gl, shells()), VIEW, *SIZE)
 
 
-def test_more_than_all_fragments_needs_no_network(deep: KBufferDeep, fresh: Frame, dump: FragmentDump) -> None:
-    fresh.count()
-    rendered = deep.render(fresh, Budget(2 * dump.total))
-    assert np.array_equal(rendered.k, dump.counts)
-    assert (rendered.skips[PREDICTOR], rendered.skips[TAIL]) == (1, 1)
-    assert not {"gather", "predict", "lambda"} & set(rendered.passes)
+def counts_of(binned: Binned, pixels: int) -> NDArray[np.uint8]:
+    """uint8 [P, B], fragments of the bins."""
+    assert binned.counts is not None
+    return np.frombuffer(binned.counts.read(binned.tail.bins * pixels), dtype=np.uint8).reshape(pixels, -1)
+
+
+def counted(frame: Frame, tail: TailName = DEFAULT_TAIL) -> NDArray[np.uint8]:
+    return counts_of(frame.gather_bins(tail, counts=True), frame.pixels)
+
+
+def expected_k(deep: KBufferDeep, frame: Frame, fragments: int) -> NDArray[np.int32]:
+    """k by the numpy form, given what the network answers on the GPU."""
+    counts = counted(frame, deep.manifest.tail.name)
+    listed = np.flatnonzero(counts.any(axis=1)).astype(np.uint32)
+    answers = deep.predict(frame, listed)
+    is_curve = deep.manifest.head == "gain-curve"
+    curve = (answers[:, 0], answers[:, 1]) if is_curve else importance_curve(answers[:, 0])
+    k = np.zeros(frame.pixels, dtype=np.int32)
+    k[listed] = solve_cuts(events_of(*curve, counts[listed]), fragments).k
+    return k
+
+
+def assert_as_simulated(rendered: Rendered, dump: FragmentDump, tail: TailName = DEFAULT_TAIL) -> None:
+    simulated = composite(dump, rendered.k, tail).reshape(*rendered.linear.shape)
+    # 4e-6 is met: where the others of a bin are hardly more than LEAST_OTHERS, their mean is a difference that cancels.
+    np.testing.assert_allclose(rendered.linear, simulated, atol=1e-5, rtol=0)
+
+
+def test_gain_curves_equal_those_of_the_numpy_network(
+    deep: KBufferDeep, network: Weights, frame: Frame, dump: FragmentDump, features: NDArray[np.float32]
+) -> None:
+    pixels = np.flatnonzero(dump.counts).astype(np.uint32)
+    read = deep.features(frame, pixels)
+    wide = np.zeros((len(pixels), len(FEATURES)), np.float32)
+    wide[:, network.columns] = read
+    expected = np.stack(network.predict(wide), axis=1)
+    difference = np.abs(deep.predict(frame, pixels) - expected) / np.maximum(1.0, np.abs(expected))
+    assert difference.max() < 1e-4, "of the features that it read"
+    from_dump = np.stack(network.predict(features[pixels]), axis=1)
+    difference = np.abs(deep.predict(frame, pixels) - from_dump) / np.maximum(1.0, np.abs(from_dump))
+    # Sums of colours are half floats: 11 bits, which spreads of nearly equal numbers lose most of.
+    assert np.quantile(difference, 0.99) < (1e-4 if network.features == FEW else 2e-1)
+
+
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+@pytest.mark.parametrize("share", SHARES)
+def test_cuts_are_those_of_numpy_and_the_picture_is_as_simulated(
+    frame: Frame,
+    dump: FragmentDump,
+    gl: moderngl.Context,
+    tmp_path: Path,
+    tail: TailName,
+    share: float,
+) -> None:
+    export_random(tmp_path, random_weights(7, FEW), derive(gather(dump, tail))[dump.counts > 0], gl, tail)
+    deep, fragments = KBufferDeep(tmp_path), int(share * dump.total)
+    rendered = deep.render(frame, Budget(fragments, tail))
+    assert np.array_equal(rendered.k, expected_k(deep, frame, fragments))
+    assert rendered.captured == rendered.k.sum() <= fragments
+    assert_as_simulated(rendered, dump, tail)
+
+
+def test_a_budget_is_met_up_to_one_bin_of_one_pixel(deep: KBufferDeep, frame: Frame, dump: FragmentDump) -> None:
+    counts = counted(frame)
+    most = int(counts.max())
+    for fragments in (0, 1, 2, dump.pixels // 8, dump.total // 3, dump.total // 2, dump.total - 1):
+        rendered = deep.render(frame, Budget(fragments))
+        assert fragments - most < rendered.captured <= fragments
+        assert np.array_equal(rendered.k, expected_k(deep, frame, fragments))
+        assert rendered.skips[PREDICTOR] == 0
+        assert_as_simulated(rendered, dump)
 
 
 @pytest.mark.parametrize("more", [0, 1000])
-def test_all_fragments_are_the_exact_picture_where_their_number_is_not_known(
+def test_all_fragments_are_the_exact_picture_and_need_no_network(
     deep: KBufferDeep, fresh: Frame, dump: FragmentDump, more: int
 ) -> None:
     rendered = deep.render(fresh, Budget(dump.total + more))
     assert not fresh.counted
     assert np.array_equal(rendered.k, dump.counts)
-    assert (rendered.skips[PREDICTOR], rendered.skips[TAIL]) == (1, 0)
-    fresh.count()
-    assert np.array_equal(deep.render(fresh, Budget(dump.total)).linear, rendered.linear)
+    assert rendered.skips[PREDICTOR] == 1
+    exact = composite(dump, dump.counts).reshape(rendered.linear.shape)
+    np.testing.assert_allclose(rendered.linear, exact, atol=1e-6, rtol=0)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.02, 0.3, 0.9])
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.3, 0.9, 1.5])
 def test_nothing_is_read_back_before_the_picture(
     deep: KBufferDeep, fresh: Frame, dump: FragmentDump, share: float, unread_until_pictured: list[bool]
 ) -> None:
-    rendered = deep.render(fresh, Budget(int(share * dump.total), "density"))
-    assert rendered.captured == int(share * dump.total)
+    rendered = deep.render(fresh, Budget(int(share * dump.total)))
+    assert rendered.captured <= int(share * dump.total)
     assert len(unread_until_pictured) == 1
 
 
-def test_another_budget_of_a_frame_needs_no_inference(bundle: Path, fresh: Frame, dump: FragmentDump) -> None:
-    deep, alone = KBufferDeep(bundle, keeps_curves=True), KBufferDeep(bundle)
-    first = deep.render(fresh, Budget(dump.total // 2))
-    again = deep.render(fresh, Budget(dump.total // 3))
-    assert again.passes["predict"] == first.passes["predict"]
-    assert again.passes["gather"] == first.passes["gather"]
-    other = alone.render(fresh, Budget(dump.total // 3))
-    assert other.passes["predict"] != first.passes["predict"], "another technique has its own predictions"
-    assert np.array_equal(again.k, other.k)
-    assert np.array_equal(again.linear, other.linear)
-
-
-def test_pixels_of_one_fragment_get_curves_when_the_budget_no_longer_covers_them(
-    bundle: Path, gl: moderngl.Context
+def test_there_are_two_geometry_passes_beside_that_of_the_ranges(
+    deep: KBufferDeep, fresh: Frame, dump: FragmentDump, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    frame = Frame(GpuScene(gl, shells(layers=1, duplicates=1)), VIEW, *SIZE)
-    n = frame.count()
-    occupied = int(np.count_nonzero(n))
-    assert (n == 1).any()
-    deep = KBufferDeep(bundle)
-    deep.render(frame, Budget(occupied))
-    again = deep.render(frame, Budget(occupied - 1))
-    alone = KBufferDeep(bundle).render(frame, Budget(occupied - 1))
-    assert again.skips[SETTLED_PIXELS] == 0
-    assert np.array_equal(again.k, alone.k)
+    drawn: list[str] = []
+    draw = fresh.gpu.draw
+    monkeypatch.setattr(fresh.gpu, "draw", lambda shader, *a, **k: (drawn.append(shader), draw(shader, *a, **k))[1])
+    rendered = deep.render(fresh, Budget(dump.total // 3))
+    assert drawn == ["range/range.frag", "gather/bins.frag", "kbuffer-deep/capture.frag"]
+    passes = ["opaque", "range", "bins", "predict", "allocate", "capture", "sort", "resolve"]
+    assert list(rendered.passes) == passes
 
 
-def test_both_solvers_give_the_same_counts(bundle: Path, fresh: Frame, dump: FragmentDump) -> None:
-    for budget in (dump.total // 5, dump.total // 2):
-        on_gpu, on_cpu = (KBufferDeep(bundle, solver=solver).render(fresh, Budget(budget)) for solver in ("gpu", "cpu"))
-        assert on_gpu.captured == on_cpu.captured == budget
-        assert (on_gpu.k == on_cpu.k).mean() > 0.999
-        assert np.abs(on_gpu.k - on_cpu.k).max() <= 1
+def test_a_picture_is_identical_from_run_to_run(
+    deep: KBufferDeep, gl: moderngl.Context, frame: Frame, dump: FragmentDump
+) -> None:
+    for share in SHARES:
+        budget = Budget(int(share * dump.total))
+        one, two = (deep.render(each, budget) for each in (frame, Frame(GpuScene(gl, shells()), VIEW, *SIZE)))
+        assert np.array_equal(one.k, two.k)
+        assert np.array_equal(one.linear, two.linear)
 
 
-def test_what_onnxruntime_predicts_is_not_solved_on_the_gpu(bundle: Path) -> None:
-    with pytest.raises(ValueError, match="GLSL"):
-        KBufferDeep(bundle, "onnx", "gpu")
+def test_one_frame_serves_several_budgets_and_techniques(
+    deep: KBufferDeep, bundle: Path, fresh: Frame, frame: Frame, dump: FragmentDump
+) -> None:
+    """Its counts become cuts: what a frame keeps for the next technique is not what this one changed."""
+    for part in (2, 3, 5):
+        budget = Budget(dump.total // part)
+        assert np.array_equal(deep.render(fresh, budget).k, KBufferDeep(bundle).render(frame, budget).k)
+
+
+@pytest.mark.parametrize("other", [name for name in TAIL_NAMES if name != DEFAULT_TAIL])
+def test_a_bundle_renders_its_own_tail_alone(deep: KBufferDeep, frame: Frame, other: TailName) -> None:
+    with pytest.raises(Problem, match=f"trained with, {DEFAULT_TAIL}, not {other}") as caught:
+        deep.render(frame, Budget(100, other))
+    assert caught.value.code == ExitCode.USAGE
+    assert "--tail" in caught.value.remedy
 
 
 @pytest.mark.parametrize(
@@ -162,57 +205,56 @@ def test_bundles_of_other_outputs_meet_the_budget_as_their_networks_say(
     tmp_path: Path,
     fresh: Frame,
     dump: FragmentDump,
+    features: NDArray[np.float32],
     gl: moderngl.Context,
     head: HeadName,
     outputs: tuple[OutputName, ...],
 ) -> None:
-    network = random_weights(5, ("log_n", "alpha_mean"), (8,), head, outputs)
-    features = derive(gather(dump))
+    network = random_weights(5, FEW, (8,), head, outputs)
     export_random(tmp_path, network, features[dump.counts > 0], gl)
     deep = KBufferDeep(tmp_path)
-    pixels = np.flatnonzero(dump.counts > 1).astype(np.uint32)
+    pixels = np.flatnonzero(dump.counts).astype(np.uint32)
     expected = network.run(features[pixels])
     np.testing.assert_allclose(deep.predict(fresh, pixels), expected, rtol=1e-3, atol=1e-3)
-    n, budget = dump.counts[pixels], dump.total // 3
-    left = budget - int(np.count_nonzero(dump.counts == 1))
-    chosen = budget_fill(expected[:, 0], n, left, 1) if head == "importance" else None
-    if chosen is None:
-        chosen, _ = solve_lambda(expected[:, 0], expected[:, 1], n, left, 1)
-    rendered = deep.render(fresh, Budget(budget))
-    assert rendered.captured == budget
-    assert (rendered.k[pixels] == chosen).mean() > 0.99
-
-
-def test_features_are_given_back_before_fragments_are_captured(
-    deep: KBufferDeep, network: Weights, fresh: Frame, dump: FragmentDump
-) -> None:
-    gathered = fresh.gather("gather", texels_of(network.features)).pixel_bytes
-    # n, depth range, curves and all sums, then the list beside the first sums; then offsets instead of curves and list,
-    # the first sums and the tail's targets, with the pool.
-    before, after = 12 + 8 + max(gathered, 16 + 4), 12 + 4 + 16 + 32
-    few = deep.render(fresh, Budget(dump.total // 10, "density"))
-    assert (few.early_bytes, few.pixel_bytes) == (before, after)
-    assert few.total_bytes == max(before * fresh.pixels, after * fresh.pixels + few.pool_bytes)
-    many = deep.render(fresh, Budget(dump.total - 1, "density"))
-    assert many.total_bytes == max(before * fresh.pixels, after * fresh.pixels + many.pool_bytes)
+    for share in SHARES:
+        fragments = int(share * dump.total)
+        rendered = deep.render(fresh, Budget(fragments))
+        k = expected_k(deep, fresh, fragments)
+        # An importance's reciprocal is rounded as the driver does it.
+        assert (rendered.k == k).mean() > (0.999 if head == "importance" else 1.0 - 1e-12)
+        assert rendered.captured <= fragments
+        assert_as_simulated(rendered, dump)
 
 
 def test_onnx_and_glsl_give_the_same_picture(deep: KBufferDeep, bundle: Path, frame: Frame, dump: FragmentDump) -> None:
     other = KBufferDeep(bundle, "onnx")
-    pixels = np.flatnonzero(dump.counts > 1).astype(np.uint32)
+    pixels = np.flatnonzero(dump.counts).astype(np.uint32)
     np.testing.assert_allclose(other.predict(frame, pixels), deep.predict(frame, pixels), rtol=1e-5, atol=1e-5)
-    budget = Budget(dump.total // 3)
-    one, two = deep.render(frame, budget), other.render(frame, budget)
-    same = one.k == two.k
-    assert same.mean() > 0.999
-    difference = np.abs(display8(one.linear).astype(int) - display8(two.linear).astype(int)).reshape(-1, 3)
-    assert difference[same].max() <= 1
+    for share in SHARES:
+        budget = Budget(int(share * dump.total))
+        one, two = deep.render(frame, budget), other.render(frame, budget)
+        same = one.k == two.k
+        assert same.mean() > 0.999
+        assert two.captured <= budget.fragments
+        assert_as_simulated(two, dump)
+        difference = np.abs(display8(one.linear).astype(int) - display8(two.linear).astype(int)).reshape(-1, 3)
+        assert difference[same].max() <= 1
+
+
+@pytest.mark.parametrize("fragments", [0, 10**7])
+def test_onnx_with_no_budget_and_more_than_enough(
+    bundle: Path, frame: Frame, dump: FragmentDump, fragments: int
+) -> None:
+    rendered = KBufferDeep(bundle, "onnx").render(frame, Budget(fragments))
+    assert rendered.captured == min(fragments, dump.total)
+    assert rendered.skips[PREDICTOR] == (fragments > 0)
+    assert_as_simulated(rendered, dump)
 
 
 def test_features_are_read_in_blocks_as_at_once(
     deep: KBufferDeep, frame: Frame, dump: FragmentDump, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    pixels = np.flatnonzero(dump.counts > 1).astype(np.uint32)
+    pixels = np.flatnonzero(dump.counts).astype(np.uint32)
     features, gain = deep.features(frame, pixels), deep.predict(frame, pixels)
     monkeypatch.setattr("renderer.techniques.kbuffer_deep._DISPATCH", 1000)
     assert len(pixels) > 2000
@@ -220,28 +262,32 @@ def test_features_are_read_in_blocks_as_at_once(
     assert np.array_equal(deep.predict(frame, pixels), gain)
 
 
-def test_only_what_the_bundle_reads_is_gathered(
+def test_only_what_the_bundle_reads_is_gathered_and_its_bytes_are_said(
     deep: KBufferDeep, network: Weights, frame: Frame, dump: FragmentDump
 ) -> None:
+    row, colours = TAILS[DEFAULT_TAIL], 16 if network.features == FEATURES else 0
     rendered = deep.render(frame, Budget(dump.total // 3))
-    full = network.features == FEATURES
-    assert rendered.skips[UNREAD_SUMS] == (0 if full else 2)
-    gathered = frame.gather("gather", texels_of(network.features))
-    assert gathered.pixel_bytes == (5 * 16 + 4 if full else 3 * 16 + 4)
-    assert rendered.skips[SETTLED_PIXELS] == np.count_nonzero(dump.counts == 1)
+    assert rendered.skips[UNREAD_COLOURS] == (colours == 0)
+    # Counts, then bins and means, or what is kept of them and the curves, beside the colours that are read.
+    assert rendered.early_bytes == row.bins + colours + max(row.gathered_bytes, row.kept_bytes + 8)
+    # Cuts and cursors are where the counts were; offsets, and the tail's sums.
+    assert rendered.pixel_bytes == row.bins + row.kept_bytes + 4 + row.sum_bytes
+    assert rendered.pool_bytes == 8 * (dump.total // 3)
 
 
-@pytest.mark.parametrize("names", [("log_n", "alpha_mean", "depth_extent"), ("depth_extent",)])
-def test_a_bundle_that_reads_no_nearest_fragment_does_not_gather_it(
-    tmp_path: Path, frame: Frame, dump: FragmentDump, gl: moderngl.Context, names: tuple[str, ...]
-) -> None:
-    network = random_weights(4, names)
-    export_random(tmp_path, network, derive(gather(dump))[dump.counts > 0], gl)
-    deep = KBufferDeep(tmp_path)
-    gathered = frame.gather("gather", texels_of(names))
-    assert gathered.nearest_colour is None
-    assert gathered.pixel_bytes == 16
-    assert deep.render(frame, Budget(dump.total // 3)).skips[UNREAD_SUMS] == 5, "all but the first"
-    pixels = np.flatnonzero(dump.counts > 1).astype(np.uint32)
-    expected = np.stack(network.predict(derive(gather(dump))[pixels]), axis=1)
-    np.testing.assert_allclose(deep.predict(frame, pixels), expected, rtol=1e-3, atol=1e-3)
+@pytest.mark.parametrize(("size", "away"), [((1, 1), False), ((3, 2), False), ((61, 45), False), ((8, 8), True)])
+def test_small_and_empty_pictures(deep: KBufferDeep, gl: moderngl.Context, size: tuple[int, int], away: bool) -> None:
+    view = VIEW.model_copy(update={"target": (VIEW.eye[0], VIEW.eye[1], 2.0 * VIEW.eye[2])}) if away else VIEW
+    frame = Frame(GpuScene(gl, shells()), view, *size)
+    n = frame.count()
+    assert n.any() != away
+    for fragments in {0, 1, max(int(n.sum()) - 1, 0), int(n.sum())}:
+        rendered = deep.render(frame, Budget(fragments))
+        assert rendered.captured <= fragments
+        assert np.array_equal(rendered.k, expected_k(deep, frame, fragments))
+        assert np.isfinite(rendered.linear).all()
+
+
+def test_counts_of_a_frame_are_all_usable(frame: Frame, dump: FragmentDump) -> None:
+    """Of the shared frame: what the tests above call N is what can be in a core."""
+    assert usable_counts(counted(frame)).sum() == dump.total

@@ -30,7 +30,7 @@ def test_selection_removes_what_the_heap_removes_ties_included(lists: list[list[
     budget = data.draw(st.integers(0, total))
     for rule, key in (("greedy", "absolute"), ("increment", "increment")):
         (found,) = allocate_curves(dump_for(curves), curves, [budget], rule)
-        assert found.k.tolist() == reference.heap_removal(split(curves), budget, found.k_min, key)
+        assert found.k.tolist() == reference.heap_removal(split(curves), budget, key)
 
 
 @pytest.mark.parametrize("tail", ["density", "paper"])
@@ -41,5 +41,5 @@ def test_selection_removes_what_the_heap_removes_on_a_view(tail: TailName) -> No
     budgets = [0, 100, occupied - 1, occupied, dump.total // 2, dump.total - 1]
     for rule, key in (("greedy", "absolute"), ("increment", "increment")):
         for found in allocate_curves(dump, curves, budgets, rule):
-            heap = reference.heap_removal(split(curves), found.budget, found.k_min, key)
+            heap = reference.heap_removal(split(curves), found.budget, key)
             assert np.array_equal(found.k, heap), (rule, found.budget)

@@ -72,7 +72,6 @@ def make_bundle(dump: FragmentDump, gl: moderngl.Context, folder: Path) -> Path:
         name="random",
         tail=TailSpec(name="density", g=0.75),
         metric="display",
-        k_min=1,
         provenance=Provenance(scenes={}, code_version="0", seed=0, machine="test"),
         evaluation={},
     )

@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from support.scenes import SIZE, VIEW, shells
 
+from renderer.bands import row_bands
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.reference import adaptive, multilayer
-from renderer.techniques import Adaptive, Budget, Multilayer, SBuffer, Technique, bands, ordered
+from renderer.techniques import Adaptive, Budget, Multilayer, SBuffer, Technique, bands
+from renderer.techniques.bands import Part
 from renderer.techniques.ordered import Ordered, capture_ordered
-from renderer.techniques.sbuffer import capture_band, row_bands
+from renderer.techniques.runs import Runs
 from schemas.fragments import FragmentDump
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
@@ -70,14 +72,20 @@ def test_order_of_arrival_in_the_pool_does_not_matter(
     frame: Frame, fragments: Ordered, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # A software driver happens to run fragments in order of submission; others do not.
-    def shuffled(
-        frame: Frame, fragment: str, offsets: np.ndarray, band: object, into: np.ndarray, ranked: bool
-    ) -> None:
-        capture_band(frame, fragment, offsets, band, into, ranked)  # type: ignore[arg-type]
-        into[:] = into[np.lexsort((np.random.default_rng(2).random(len(into)), pixels_of(offsets)))]
+    changed: list[bool] = []
 
-    monkeypatch.setattr(ordered, "capture_band", shuffled)
+    def shuffled(runs: Runs, part: Part) -> moderngl.Buffer:
+        pool = kept(runs, part)
+        words = np.frombuffer(pool.read(), dtype=np.uint32).reshape(-1, 3)
+        order = np.lexsort((np.random.default_rng(2).random(len(words)), pixels_of(fragments.offsets)))
+        pool.write(np.ascontiguousarray(words[order]))
+        changed.append(not np.array_equal(words[order], words))
+        return pool
+
+    kept = Runs.capture
+    monkeypatch.setattr(Runs, "capture", shuffled)
     again = capture_ordered(frame)
+    assert changed == [True]
     for field in ("packed", "depth", "rank"):
         assert np.array_equal(getattr(again, field), getattr(fragments, field)), field
 
@@ -88,8 +96,7 @@ def test_bands_of_rows_give_the_same_picture__technique(
 ) -> None:
     whole = technique.render(frame, Budget(0))
     limits = replace(LIMITS, buffer_bytes=60_000)
-    for module in (ordered, bands):
-        monkeypatch.setattr(module, "LIMITS", limits)
+    monkeypatch.setattr(bands, "LIMITS", limits)
     split: list[tuple[int, int]] = []
     monkeypatch.setattr(bands, "row_bands", lambda *args: split.extend(row_bands(*args)) or split)
     assert np.array_equal(technique.render(frame, Budget(0)).linear, whole.linear)
@@ -136,9 +143,12 @@ def test_a_picture_is_identical_from_frame_to_frame__technique(
 @pytest.mark.parametrize("technique", [Multilayer(), Adaptive()], ids=lambda technique: technique.name)
 def test_passes_bytes_and_skips_are_reported__technique(frame: Frame, dump: FragmentDump, technique: Technique) -> None:
     rendered = technique.render(frame, Budget(0))
-    assert list(rendered.passes) == ["opaque", "count", "capture", "sort", "upload", "resolve"]
+    assert list(rendered.passes) == ["opaque", "count", "prefix", "capture", "sort", "resolve"]
     assert rendered.pool_bytes == 12 * dump.total
-    assert rendered.total_bytes == 12 * dump.total + 16 * frame.pixels
+    assert rendered.total_bytes == 12 * dump.total + 4 * frame.pixels
+    nodes = {"multilayer": 4, "adaptive": 8}[technique.name]
+    assert rendered.node_bytes == 8 * nodes
+    assert rendered.compared_bytes == 8 * nodes * frame.pixels
     assert rendered.skips["empty tiles"] > 0
 
 

@@ -30,7 +30,7 @@ def write(folder: Path, weights: Weights) -> Path:
 
 @pytest.mark.parametrize(
     ("features", "hidden"),
-    [(FEATURES[:26], (32, 16)), (FEATURES[::3], (16,)), (("depth_std",), ()), (FEATURES[::-1], (8, 8, 8))],
+    [(FEATURES[:26], (32, 16)), (FEATURES[::3], (16,)), (("rgb_std_g",), ()), (FEATURES[::-1], (8, 8, 8))],
 )
 def test_all_forms_agree(
     gl: moderngl.Context, tmp_path: Path, features: tuple[str, ...], hidden: tuple[int, ...]

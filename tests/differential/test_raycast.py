@@ -30,6 +30,7 @@ from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.opaque_depth import opaque_depth
 from renderer.samples import SAMPLES
+from renderer.samples.deep import DEEP
 from renderer.scene import load_scene
 from schemas.fragments import FragmentDump
 from schemas.scene import SceneArrays
@@ -62,6 +63,14 @@ def test_own_scenes_are_what_rays_see(gl: moderngl.Context, samples: dict[str, C
     result = check(gl, samples[name], EFFORT)
     assert result.problems == []
     assert all(tally.fragments > 0 for tally in result.tallies.values())
+
+
+@pytest.mark.parametrize("name", ["anatomy", "fur", "fountain", "marbles", "turbofan", "cloudscape"])
+def test_own_deep_scenes_are_what_rays_see(gl: moderngl.Context, tmp_path: Path, name: str) -> None:
+    few = replace(EFFORT, size=(96, 64), pixels=40)
+    result = check(gl, Case(name, DEEP[name](tmp_path)), few)
+    assert result.problems == []
+    assert result.tallies["alpha .33"].fragments > 0
 
 
 @pytest.mark.skipif(not described(), reason="the scenes are not here")

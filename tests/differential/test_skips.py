@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import moderngl
 import numpy as np
 import pytest
 from support.scenes import SIZE, VIEW, shells
-from support.training import random_weights
 
-from renderer.allocation.fill import solve_lambda
-from renderer.capture import capture
-from renderer.features import derive, gather
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.techniques import TECHNIQUES, Budget, KBufferOptimal, technique
 from renderer.techniques.skips import EMPTY_TILES, TAIL
+from renderer.tiles import Tiles, tiles_of
 from schemas.fragments import FragmentDump
 
 COUNTING = [
@@ -35,10 +34,20 @@ def test_empty_tiles_are_the_background(odd: Frame, name: str, monkeypatch: pyte
     odd.count()
     tiled = technique(name).render(odd, Budget(3 * odd.pixels))
     assert tiled.skips[EMPTY_TILES] > 10
-    monkeypatch.setattr(Frame, "counted", False)
-    whole = technique(name).render(odd, Budget(3 * odd.pixels))
+    for module in ("frame", "techniques.bands", "techniques.peeling"):
+        monkeypatch.setattr(f"renderer.{module}.tiles_of", without_empty_tiles)
+    again = Frame(odd.gpu, VIEW, odd.width, odd.height)
+    again.count()
+    whole = technique(name).render(again, Budget(3 * odd.pixels))
     assert whole.skips[EMPTY_TILES] == 0
     assert np.array_equal(tiled.linear, whole.linear)
+
+
+def without_empty_tiles(*args: Any) -> Tiles:
+    """Every tile is drawn as if it had a fragment."""
+    tiles = tiles_of(*args)
+    tiles.most.write(np.maximum(np.frombuffer(tiles.most.read(), dtype=np.uint32), 1))
+    return tiles
 
 
 def test_pixels_that_need_no_tail_are_the_same_with_one(frame: Frame, dump: FragmentDump) -> None:
@@ -50,16 +59,3 @@ def test_pixels_that_need_no_tail_are_the_same_with_one(frame: Frame, dump: Frag
     assert (without.skips[TAIL], with_tail.skips[TAIL]) == (1, 0)
     differs = (without.linear != with_tail.linear).any(axis=2).ravel()
     assert not np.delete(differs, fullest).any()
-
-
-def test_settled_pixels_have_no_part_in_the_choice_of_lambda(gl: moderngl.Context) -> None:
-    dump = capture(Frame(GpuScene(gl, shells(layers=3)), VIEW, *SIZE)).dump
-    n = dump.counts
-    occupied, opened = np.flatnonzero(n > 0), np.flatnonzero(n > 1)
-    assert len(opened) < len(occupied)
-    a, b = random_weights(4).predict(derive(gather(dump)))
-    for budget in (len(occupied), dump.total // 2, dump.total - 1):
-        every, _ = solve_lambda(a[occupied], b[occupied], n[occupied], budget, 1)
-        left = budget - (len(occupied) - len(opened))
-        some, _ = solve_lambda(a[opened], b[opened], n[opened], left, 1)
-        assert np.array_equal(every[n[occupied] > 1], some)

@@ -31,8 +31,7 @@ def test_every_path_is_within_its_bound() -> None:
 
 def test_the_exact_hull_is_the_lowest_convex_curve() -> None:
     error = np.array([9.0, 8.0, 2.0, 1.5, 0.0, 0.0], np.float32)
-    assert [float(x) for x in exact_hull(error, 0)] == [9.0, 5.5, 2.0, 1.0, 0.0]
-    assert [float(x) for x in exact_hull(error, 1)] == [8.0, 2.0, 1.0, 0.0]
+    assert [float(x) for x in exact_hull(error)] == [9.0, 5.5, 2.0, 1.0, 0.0]
 
 
 def violated(monkeypatch: pytest.MonkeyPatch, name: str, broken: Callable[..., Any]) -> set[str]:
@@ -80,7 +79,7 @@ def test_hulls_that_are_not_the_lowest_are_seen(monkeypatch: pytest.MonkeyPatch)
 
     def high(*args: Any) -> Hulls:
         hulls = lower(*args)
-        return Shuffled(hulls.offsets, hulls.k, hulls.error * np.float32(1.001), hulls.k_min)
+        return Shuffled(hulls.offsets, hulls.k, hulls.error * np.float32(1.001))
 
     assert violated(monkeypatch, "lower_hulls", high) == {"hull", "hull.slopes"}
 

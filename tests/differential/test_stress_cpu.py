@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 from labeller.curves import error_curves
-from renderer.depth_bins import place_of, units_in_front
+from renderer.allocation.cuts import Cuts
+from renderer.depth_bins import bin_form, keep_bins, kept_room, place_of
 from renderer.features import FEATURES, SUMS, derive, gather
-from schemas.tail import BIN_LIMIT, DENSITY_BINS, SHARE_LEVELS
-from services.stress import curves, features
+from schemas.tail import BIN_LIMIT, BINNED_TAILS, MOST_BINS, TAILS
+from services.stress import curves, features, fills
 from services.stress.bounds import BOUNDS
 from services.stress.cases import bin_cases, curve_cases, dump_of, some_list
 from services.stress.findings import Finding, Options, Row
@@ -43,8 +45,8 @@ def refused(found: Sequence[Row]) -> list[Row]:
             {"curves", "curves.weights", "curves.by_g", "exponents", "composite", "reference", "transmittance", "csr"}
             | {"transmittance.float32", "transmittance.rejected"},
         ),
-        ("fills", {"fill.limits", "fill.budget", "fill.lambda", "fill.lattice", "fill.order", "sum", "sum.rejected"}),
-        ("features", {"features.gather", "features.derive", "features.spread", "features.front"}),
+        ("fills", {"fill.limits", "fill.budget", "fill.lambda", "fill.cuts", "fill.order", "sum", "sum.rejected"}),
+        ("features", {f"features.{name}" for name in ("gather", "place", "derive", "spread", "kept")}),
     ],
 )
 def test_every_path_of_a_suite_is_within_its_bound(name: str, paths: set[str]) -> None:
@@ -73,39 +75,51 @@ def test_the_cases_are_what_method_section_6_names() -> None:
 
 def test_hard_lists_of_depth_bins_are_what_their_names_say() -> None:
     edges, ties, full = (case.dump for case in bin_cases())
-    for bins in DENSITY_BINS.values():
+    for bins in (8, MOST_BINS):  # those of 12 are at other places, but for every third
         depth = edges.depth[:85]
         place = [float(place_of(z, depth[0], depth[-1] - depth[0], bins)) for z in depth]
         inner = [sum(abs(y - b) < 1e-4 for y in place) for b in range(1, bins)]
         assert min(inner) >= 4, "1 ulp before, at and behind every edge"
         assert {int(y) for y in place} == set(range(bins + 1))
-    shares = gather(ties, 8)[:, SUMS.index("front_8")] * SHARE_LEVELS
+    shares = gather(ties, "density-16")[:, SUMS.index("front_8")] * TAILS["density-16"].share_levels
     ahead = np.arange(1, 30, 2)
     np.testing.assert_array_equal(np.rint(shares), (ahead + 1) // 2)  # of `ahead` thirtieths, up
-    front = np.empty(9)
-    units_in_front(full.depth[:64], full.rgba[:64], front)
-    assert front[-1] == BIN_LIMIT
+    form, depth = bin_form(TAILS["binned-8"]), full.depth[:64]
+    assert keep_bins(form, depth, full.rgba[:64], depth[0], np.float32(1.0), kept_room()) == BIN_LIMIT
 
 
 @pytest.mark.parametrize(
     ("name", "broken", "path"),
     [
-        ("gather", lambda dump, bins=0: gather(dump, bins) * np.float32(1.2), "features.front"),
-        ("binned_exponents", lambda depth, rgba, optical, front, out: out.fill(0.5), "exponents"),
+        ("gather", lambda dump, tail: gather(dump, tail) * np.float32(1.2), "features.kept"),
+        ("binned_exponents", lambda *arguments: arguments[-1].fill(0.5), "exponents"),
     ],
 )
 def test_other_accounts_of_depth_bins_are_violations__name(
     monkeypatch: pytest.MonkeyPatch, name: str, broken: Callable[..., object], path: str
 ) -> None:
-    module = features if path == "features.front" else curves
+    module = features if path == "features.kept" else curves
     monkeypatch.setattr(module, name, broken)
     case = bin_cases()[0]
     found = [
-        features._fronts(case, bins) if path == "features.front" else curves._exponents(case, tail)
-        for tail, bins in DENSITY_BINS.items()
+        features._kept(case, tail) if path == "features.kept" else curves._exponents(case, tail)
+        for tail in BINNED_TAILS
     ]
-    assert [(row.path, row.ok) for row in found] == [(path, False)] * 2
+    assert [(row.path, row.ok) for row in found] == [(path, False)] * len(BINNED_TAILS)
     assert "pixel" in found[0].where
+
+
+def test_cuts_that_leave_bins_out_or_take_too_many_are_violations(monkeypatch: pytest.MonkeyPatch) -> None:
+    solve = fills.solve_cuts
+
+    def violated(change: Callable[[Cuts], Cuts]) -> set[str]:
+        monkeypatch.setattr(fills, "solve_cuts", lambda events, budget: change(solve(events, budget)))
+        return {row.path for row in fills._whole_bins(np.random.default_rng(0), 300) if not row.ok}
+
+    assert violated(lambda cuts: cuts) == set()
+    assert violated(lambda cuts: replace(cuts, k=cuts.k + 1)) == {"fill.limits"}
+    assert violated(lambda cuts: replace(cuts, k=0 * cuts.k, cut=0 * cuts.cut)) == {"fill.limits"}
+    assert "fill.cuts" in violated(lambda cuts: replace(cuts, cut=np.where(cuts.cut > 1, 1, cuts.cut)))
 
 
 def test_the_rejected_formula_is_as_bad_as_told_and_the_one_in_use_is_not() -> None:
@@ -127,28 +141,35 @@ def test_one_float32_accumulator_loses_what_the_sum_in_use_keeps() -> None:
 
 
 def test_the_twins_are_what_the_definitions_say() -> None:
-    rgba = np.array([[255, 0, 0, 51], [255, 0, 0, 102]], np.uint8)
+    rgba = np.array([[255, 0, 0, 51], [0, 255, 0, 102]], np.uint8)
     dump = dump_of([(rgba, np.array([2.0, 4.0], np.float32))], (0, 0, 255))
-    found = dict(zip(FEATURES, features64(sums64(dump))[0], strict=True))
+    found = dict(zip(FEATURES, features64(sums64(dump, "binned-8"))[0], strict=True))
+    light = -np.log([0.8, 0.6])
+    share = light / light.sum()
     assert found["log_n"] == 1.0
-    assert found["alpha_mean"] == pytest.approx(0.3)
-    assert found["alpha_std"] == pytest.approx(0.1)
-    assert found["optical_depth"] == pytest.approx(np.log1p(-np.log(0.8 * 0.6)))
+    assert found["optical_depth"] == pytest.approx(np.log1p(light.sum()), abs=1e-3)  # D in units of 1 / 951
     assert found["depth_extent"] == pytest.approx(np.log(1e-4 + 0.5))
-    assert (found["rgb_mean_r"], found["rgb_std_r"], found["background_b"]) == (1.0, 0.0, 1.0)
+    assert [found[f"rgb_mean_{c}"] for c in "rgb"] == pytest.approx([*share, 0.0], abs=1e-3)
+    assert found["rgb_std_r"] == pytest.approx(np.sqrt(share[0] * share[1]), abs=1e-3)
+    assert (found["rgb_std_b"], found["background_b"]) == (pytest.approx(np.sqrt(1e-3)), 1.0)
+    assert found["depth_mean"] == pytest.approx(share[1], abs=1e-3)  # places 0 and 1
+    assert found["luma_depth_cov"] == pytest.approx(share[0] * share[1] * (0.7152 - 0.2126), abs=1e-3)
+    assert {found[f"front_{b}"] for b in range(1, 8)} == {round(255 * share[0]) / 255}
+    assert {found[f"mean_{b}"] for b in range(1, 8)} == {0.0}
+    assert {found[f"front_{b}"] for b in range(8, 16)} == {0.0}
     layers = [(np.array([[2.0], [0.0]], np.float32), np.array([1.0, 0.0], np.float32))]
     a, b = network64(np.zeros(1, np.float32), np.ones(1, np.float32), layers, np.array([[3.0]], np.float32))[0]
     assert (a, b) == pytest.approx((7.0, np.log(2.0) + 0.02))
 
 
-def test_the_worst_spread_known_is_committed_and_within_its_bound() -> None:
-    found = {row.path: row for row in findings("features")}["features.spread"]
-    assert found.where.startswith("found: 89 equal fragments")
-    assert found.absolute > 4e-4
+def test_spreads_of_equal_fragments_end_at_their_least() -> None:
+    (case,) = (case for case in curve_cases(True, 0) if case.name == "found: 89 equal fragments")
+    found = derive(gather(case.dump, features.EVERY))[:, features.SPREADS]
+    np.testing.assert_array_equal(found, np.sqrt(np.float32(1e-3)))
 
 
 @pytest.mark.parametrize("n", [1, 4096])
 def test_features_of_long_lists_stay_finite(n: int) -> None:
     dump = dump_of([some_list(np.random.default_rng(n), n, 1)])
-    assert np.isfinite(derive(gather(dump))).all()
+    assert np.isfinite(derive(gather(dump, features.EVERY))).all()
     assert np.isfinite(error_curves(dump).error).all()

@@ -13,9 +13,21 @@ from labeller import reference
 from renderer import programs
 from renderer.programs import Programs
 from renderer.reference import moment
-from renderer.techniques import TECHNIQUES, Budget, KBuffer, KBufferDeep, KBufferDynamic, KBufferOptimal, Needs
+from renderer.techniques import TECHNIQUES, Budget, KBufferDeep, KBufferDynamic, KBufferOptimal, Needs
 from renderer.techniques.ordered import Ordered, capture_ordered
-from services.stress import gl, gl_bounds, gl_capture, gl_child, gl_moment, gl_network, gl_refused, gl_techniques
+from schemas.tail import DEFAULT_TAIL, TAILS, TailKind
+from services.stress import (
+    gl,
+    gl_allocation,
+    gl_bins,
+    gl_bounds,
+    gl_capture,
+    gl_child,
+    gl_moment,
+    gl_network,
+    gl_refused,
+    gl_techniques,
+)
 from services.stress.findings import Broken, Finding, Options
 from services.stress.gl_cases import EVERY_BUDGET, Case, make_case, sceneries
 from services.stress.gl_drivers import GPU, LLVMPIPE, ZINK
@@ -61,6 +73,7 @@ def test_a_sound_renderer_is_within_its_bounds(
     case = make_case(gl, CASES[name], shared)
     rows = [
         *gl_capture.rows(case, "here"),
+        *gl_bins.rows(case, "here"),
         *gl_network.rows(case, made, "here"),
         *(row for _, work in gl_techniques.steps(case, QUICK, "here", made) for row in work()),
     ]
@@ -100,42 +113,44 @@ def test_a_broken_tail_is_a_violation_and_named(gl: moderngl.Context, monkeypatc
     replaced(monkeypatch, "kbuffer/resolve.frag", "exp(-opacity.x)", "exp(-1.0001 * opacity.x)")
     rows = chain(make_case(gl, CASES["stacks"], Programs(gl)))
     wrong = {row.path for row in rows if not row.ok}
-    assert wrong == {"kbuffer-optimal.density · here", "kbuffer-optimal.exact-coverage · here"}
+    tails = {name for name, tail in TAILS.items() if tail.kind not in (TailKind.WEIGHTED_AVERAGE, TailKind.PAPER)}
+    assert wrong == {f"kbuffer-optimal.{name} · here" for name in tails}
     assert all("F = " in row.where and "pixel" in row.where for row in rows if not row.ok)
 
 
 @pytest.mark.parametrize(
     ("file", "old", "new", "paths"),
     [
-        ("gather/pack.comp", "front[b] + total)", "front[b] + total / 2u)", {"bins.shares", "features.front"}),
         (
-            "gather/gather.frag",
-            "int(bin_place(v_depth, nearest, extent))",
-            "int(0.9 * bin_place(v_depth, nearest, extent))",
-            {"bins.shares", "features.front"},
+            "gather/pack.comp",
+            "level(front[b + 1], total,",
+            "level(front[b + 1] / 2u, total,",
+            {"bins.kept", "features.kept"},
+        ),
+        ("gather/pack.comp", "level(moved[j],", "level(moved[j] / 2u,", {"bins.kept", "features.kept"}),
+        (
+            "common/depth_bins.glsl",
+            "precise float root = float(ROOT_SHARE)",
+            "precise float root = 0.9",
+            {"bins.kept", "bins.counts"},
+        ),
+        ("gather/bins.frag", "floor(moved)", "ceil(moved)", {"bins.kept"}),
+        ("gather/bins.frag", "before + (1u << shift)", "before + (2u << shift)", {"bins.counts", "features"}),
+        (
+            "gather/bins.frag",
+            "optical_depth * vec4(rgb * rgb, y)",
+            "optical_depth * vec4(9.0 * rgb * rgb, y)",
+            {"bins.colours", "features.half spread"},
         ),
         (
-            "gather/gather.frag",
-            "binned_depth = optical_depth",
-            "binned_depth = 1.001 * optical_depth",
-            {"bins.optical depth"},
-        ),
-        ("kbuffer-deep/inputs.glsl", "const int every = 16", "const int every = 32", {"features.front"}),
-        (
-            "gather/gather.frag",
-            "vec4(1.0, a, a * a, optical_depth)",
-            "vec4(1.0, 0.5 * a, a * a, optical_depth)",
-            {"gather", "gather.half", "features", "features.half", "features.spread"},
-        ),
-        (
-            "gather/gather.frag",
-            "vec4(rgb * rgb, 0.0)",
-            "vec4(9.0 * rgb * rgb, 0.0)",
-            {"gather", "gather.half", "features.spread", "features.half spread"},
+            "kbuffer-deep/inputs.glsl",
+            "for (int b = 0; b < BINS - 1; ++b)",
+            "for (int b = 1; b < BINS - 1; ++b)",
+            {"features.kept"},
         ),
     ],
 )
-def test_a_broken_gather_pass_is_a_violation_and_named(
+def test_a_broken_pass_over_bins_is_a_violation_and_named(
     gl: moderngl.Context,
     made: gl_network.Networks,
     monkeypatch: pytest.MonkeyPatch,
@@ -145,9 +160,39 @@ def test_a_broken_gather_pass_is_a_violation_and_named(
     paths: set[str],
 ) -> None:
     replaced(monkeypatch, file, old, new)
-    case = make_case(gl, CASES["far / near of 1e7"], Programs(gl))
-    wrong = {row.path.split(" · ")[0] for row in gl_network.rows(case, made, "here") if not row.ok}
-    assert wrong >= paths
+    case = make_case(gl, CASES["stacks"], Programs(gl))
+    rows = [*gl_bins.rows(case, "here"), *gl_network.rows(case, made, "here")]
+    assert {row.path.split(" · ")[0] for row in rows if not row.ok} >= paths
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        ("range/range.frag", "atomicMin(tile_range[2 * tile], floatBitsToUint(v_depth - reach))", ""),
+        ("range/range.frag", "v_depth + reach", "v_depth * 1.1"),
+        ("range/fill.comp", "uvec2 range = found[tile]", "uvec2 range = found[tiles - 1 - tile]"),
+    ],
+)
+def test_a_wrong_range_of_tiles_is_a_violation(
+    gl: moderngl.Context, monkeypatch: pytest.MonkeyPatch, file: str, old: str, new: str
+) -> None:
+    replaced(monkeypatch, file, old, new)
+    case = make_case(gl, CASES["slanted triangles"], Programs(gl))
+    assert not gl_bins._ranges(case, "here").ok
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new"),
+    [
+        ("allocation/rank.glsl", "0.5 *", "0.51 *"),
+        ("allocation/place.comp", "before.y + growth <= spare", "before.y + growth < spare"),
+    ],
+)
+def test_a_broken_allocation_is_a_violation(
+    gl: moderngl.Context, monkeypatch: pytest.MonkeyPatch, file: str, old: str, new: str
+) -> None:
+    replaced(monkeypatch, file, old, new)
+    assert not all(row.ok for row in gl_allocation.rows(gl, QUICK, "here"))
 
 
 def test_curves_that_stay_nan_are_a_violation(
@@ -157,20 +202,21 @@ def test_curves_that_stay_nan_are_a_violation(
     deep, needs = KBufferDeep, Needs(bundle=made.overflowing)
     answers = deep(made.overflowing).predict(case.frame, np.flatnonzero(case.dump.counts).astype(np.uint32))
     assert np.isnan(answers).any()
-    form = gl_techniques.Form("overflowing", ("density",))
+    form = gl_techniques.Form("overflowing", (DEFAULT_TAIL,))
     truth = Truth.of(case)
     assert all(row.ok for row in gl_techniques.bounded_rows(case, truth, deep.name, needs, "here", form))
-    replaced(monkeypatch, "kbuffer-deep/curves.comp", "is_nan ? least", "is_nan ? x")
+    replaced(monkeypatch, "kbuffer-deep/curves.comp", "is_nan ? for_nan", "is_nan ? x")
     case = make_case(gl, CASES["alpha 0 and 1"], Programs(gl))
     rows = gl_techniques.bounded_rows(case, truth, deep.name, needs, "here", form)
-    assert [row.path for row in rows if not row.ok] == ["overflowing.F, K and k_min · here"]
+    assert [row.path for row in rows if not row.ok] == ["overflowing.F and K · here"]
 
 
 def test_a_picture_that_is_not_finite_is_a_violation(gl: moderngl.Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    replaced(monkeypatch, "sbuffer/resolve.frag", "vec4(over(light", "vec4(sqrt(light.rgb - 9.0) + over(light")
     replaced(monkeypatch, "kbuffer/resolve.frag", "light.rgb + light.a", "sqrt(light.rgb - 9.0) + light.a")
     case = make_case(gl, CASES["alpha 0 and 1"], Programs(gl))
     assert not picture(case, "sbuffer")[0].ok
-    limits = [row for row in chain(case) if "k_min" in row.path]
+    limits = [row for row in chain(case) if "F and K" in row.path]
     assert [row.ok for row in limits] == [False]
     assert "not finite" in limits[0].where
 
@@ -179,7 +225,7 @@ def test_a_broken_twin_is_a_violation(gl: moderngl.Context, shared: Programs, mo
     case = make_case(gl, CASES["alpha 0 and 1"], shared)
     composite, share = reference.composite, moment.share_before
     monkeypatch.setattr(reference, "composite", lambda *args: composite(*args) + 1e-5)
-    assert not any(row.ok for row in chain(case) if "k_min" not in row.path)
+    assert not any(row.ok for row in chain(case) if "F and K" not in row.path)
     monkeypatch.setattr(moment, "share_before", lambda *args: 0.99 * share(*args))
     assert not picture(case, "moment")[0].ok
 
@@ -219,8 +265,8 @@ def test_every_way_to_break_a_budget_is_named(gl: moderngl.Context, shared: Prog
 
     assert "above F" in broken(KBufferDynamic.name, k=n.astype(np.int32))
     assert "above n" in broken(KBufferDynamic.name, k=sound.k + 1)
-    assert "below k_min" in broken(KBufferDynamic.name, k=np.zeros_like(sound.k))
-    assert "below k_min" not in broken(KBuffer.name, k=np.zeros_like(sound.k))
+    assert "below 0" in broken(KBufferDynamic.name, k=sound.k - n.max().astype(np.int32) - 1)
+    assert broken(KBufferDynamic.name, k=np.zeros_like(sound.k), captured=0) == "", "k = 0 everywhere is legal"
     assert "leaves a part" in broken(KBufferOptimal.name, k=np.zeros_like(sound.k))
     assert "captured" in broken(KBufferDynamic.name, captured=0)
     assert "finite" in broken(KBufferDynamic.name, linear=np.full_like(sound.linear, np.nan))
@@ -242,7 +288,9 @@ def test_an_exception_is_a_row_and_not_the_end(gl: moderngl.Context, monkeypatch
     assert [row.path for row in broken] == ["stochastic · here"]
     assert "Error" in broken[0].why
     assert all(row.ok for row in rows if isinstance(row, Finding))
-    assert {"sbuffer · here", "kbuffer-deep.paper · here"} < {row.path for row in rows}
+    assert {"sbuffer · here", "kbuffer-deep.density-16 · here", "kbuffer-optimal.paper · here"} < {
+        row.path for row in rows
+    }
     assert {"at": "stochastic, alpha 0 and 1"} in said
 
 

@@ -10,54 +10,81 @@ from pathlib import Path
 import pytest
 from support.training import random_weights
 
-from renderer.allocation.gpu import _COUNT_GROUPS, BLOCK, CURVE_DEFINES, STATE
+from renderer.allocation.gpu import BLOCK, DEFINES, STATE
 from renderer.features import TEXELS
-from renderer.frame import BIN_DEFINES
 from renderer.programs import SHADERS, Defines, expand
-from schemas.tail import MAX_EXPONENT
+from renderer.tile_range import STEPS
+from schemas.tail import BIN_CONSTANTS, MAX_EXPONENT, TAILS, TailKind, TailName
 from trainer.export_shader import shader_source
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENT = (ROOT / "docs" / "CLIENTS.md").read_text(encoding="utf-8")
 FRAME = DOCUMENT.split("## The frame")[1].split("## What to skip")[0]
 
-CONSTANTS: dict[str, float] = {**CURVE_DEFINES, **BIN_DEFINES, "MAX_EXPONENT": MAX_EXPONENT, "TEXELS": TEXELS}
+ALLOCATION = ("BLOCK", "HALF_BITS", "DROPPED_BITS", "FULL", "MOST_CORE")
+LIMITS = ("MOST_GAIN", "LEAST_FALL", "MOST_FALL")
+KINDS = {f"TAIL_{kind.name}": int(kind) for kind in TailKind}
+CONSTANTS: Defines = {
+    **{name: DEFINES[name] for name in (*ALLOCATION, *LIMITS)},
+    **BIN_CONSTANTS,
+    **KINDS,
+    **{"TAIL": int(TailKind.BINNED), "MAX_EXPONENT": MAX_EXPONENT, "TEXELS": TEXELS},
+}
 """What the document says in numbers."""
-LATTICE = ("BLOCK", "EDGES", "LAST", "SHIFT", "TURNS")
-CURVES = (*LATTICE, "MOST_GAIN", "LEAST_RATE", "MOST_RATE")
-BINS = ("ROOT_SHARE", "PLAIN_SHARE", "SHARE_LEVELS", "OPTICAL_UNIT", "BIN_LIMIT")
-ALLOCATION = ("totals", "begin", "list", "count", "choose", "blocks", "scan", "offsets")
+BINS = ("TAIL", *KINDS, *BIN_CONSTANTS)
+BINNED = [name for name, tail in TAILS.items() if tail.bins]
 
 SURFACE: Defines = {"TEXTURED": 0, "MIXED": 1, "WRAPPED": 0, "MORE_UVS": 0, "EMISSIVE": 0}
 """Of the renderer's own surfaces, which a client replaces; `MIXED` is the document's."""
 
 IMPORTANCES = random_weights(1, head="importance", outputs=("importance",))
 
+
+def row(name: TailName) -> Defines:
+    """What the document's table says of a tail."""
+    cells = re.search(rf"^\| `{name}`[^|]*\|(.*)\|$", DOCUMENT, flags=re.MULTILINE)
+    assert cells is not None
+    numbers = [int(cell) for cell in re.findall(r"\d+", cells[1])]
+    tail = TAILS[name]
+    assert numbers[3:] == [tail.gathered_bytes, tail.kept_bytes]
+    return dict(zip(("BINS", "SHARE_LEVELS", "MEAN_LEVELS"), numbers, strict=False))
+
+
 # Shader -> constants, and defines that have no one value.
 COMPILED: list[tuple[str, tuple[str, ...], Defines]] = [
-    ("count/count.frag", (), {"RANGE": 1}),
-    *(("gather/gather.frag", BINS, {"BINS": bins, "NEAREST": 0}) for bins in (8, 16)),
-    *(("gather/pack.comp", BINS, {"BINS": bins}) for bins in (8, 16)),
-    ("gather/gather.frag", (), {"BINS": 0, "NEAREST": 1, "SUMS1": 0, "SUMS3": 1}),
-    ("gather/gather.frag", (), {"BINS": 0, "NEAREST": 0, **{f"SUMS{i}": i for i in range(5)}}),
-    *((f"allocation/{name}.comp", LATTICE, {}) for name in ALLOCATION),
-    ("kbuffer-deep/curves.comp", (*CURVES, "TEXELS", *BINS), {"BINS": 16, "OUTPUTS": 2}),
-    ("kbuffer-deep/curves.comp", (*CURVES, "TEXELS"), {"BINS": 0, "OUTPUTS": 1}),
-    ("kbuffer-deep/predict.comp", ("TEXELS", *BINS), {"BINS": 16, "FEATURES_ONLY": 0, "OUTPUTS": 2}),
-    ("kbuffer/chain_depth.frag", (), {}),
-    ("kbuffer/resolve.frag", BINS, {"TAIL": 4, "BINS": 16, "STRIDE": 2}),
-    *(
-        (f"kbuffer/{chain}.frag", (*BINS, "MAX_EXPONENT"), {"TAIL": tail, "BINS": 16})
-        for chain in ("chain", "chain_colour")
-        for tail in (-1, 0, 1, 2, 3, 4)
-    ),
+    ("range/range.frag", (), {"STEPS": 2}),
+    ("range/fill.comp", (), {}),
+    *((f"allocation/{name}.comp", ALLOCATION, {"BINS": 12}) for name in ("totals", "blocks", "scan", "place")),
+    *(("allocation/choose.comp", ALLOCATION, {"STEP": step}) for step in (0, 1, 2)),
+    *(("allocation/count.comp", ALLOCATION, {"BINS": 12, "LOW": low}) for low in (0, 1)),
+    ("kbuffer-deep/sort.comp", (), {"BINS": 12}),
+    ("common/weighted_mean.frag", (), {}),
 ]
+for _name in BINNED:
+    _row, _inputs = row(_name), ("TEXELS", *BINS, *ALLOCATION, *LIMITS)
+    COMPILED += [
+        ("gather/bins.frag", BINS, {**_row, "ALONE": 0, "COLOURS": 0, "COUNTS": 0}),
+        ("gather/bins.frag", BINS, {**_row, "ALONE": 0, "COLOURS": 1, "COUNTS": 1}),
+        ("gather/bins.frag", BINS, {**_row, "ALONE": 1, "COLOURS": 1, "COUNTS": 0}),
+        ("gather/pack.comp", BINS, _row),
+        ("binned/tail.frag", (*BINS, "MAX_EXPONENT"), _row),
+        ("kbuffer-deep/curves.comp", _inputs, {**_row, "COLOURS": 1, "OUTPUTS": 2}),
+        ("kbuffer-deep/curves.comp", _inputs, {**_row, "COLOURS": 0, "OUTPUTS": 1}),
+        ("kbuffer-deep/predict.comp", _inputs, {**_row, "COLOURS": 1, "OUTPUTS": 2, "FEATURES_ONLY": 0}),
+        ("kbuffer-deep/capture.frag", (*BINS, "MAX_EXPONENT"), _row),
+        ("kbuffer/resolve.frag", BINS, {**_row, "STRIDE": 2, "CURSOR": _row["BINS"] // 4}),
+    ]
+
+
+@pytest.mark.parametrize("name", BINNED)
+def test_tails_are_those_of_the_table(name: TailName) -> None:
+    assert row(name).items() <= TAILS[name].defines.items()
 
 
 def said() -> dict[str, set[float]]:
     """Defines that the document gives numbers, in whatever place."""
     found: dict[str, set[float]] = {}
-    for name, value in re.findall(r"`([A-Z_]+) (-?[\d.]+(?:e-?\d+)?)`", DOCUMENT):
+    for name, value in re.findall(r"`([A-Z_]+)\s+(-?[\d.]+(?:e-?\d+)?)`", DOCUMENT):
         found.setdefault(name, set()).add(float(value))
     return found
 
@@ -88,17 +115,17 @@ def test_every_shader_compiles_with_what_is_defined_there(tmp_path: Path) -> Non
 
 
 def test_the_state_is_as_large_as_it_says() -> None:
-    assert f"{STATE.itemsize} bytes" in DOCUMENT
-    assert f"at byte {_COUNT_GROUPS} of State" in DOCUMENT
-    assert f"floor(P / {BLOCK})" in DOCUMENT
+    assert f"{STATE.itemsize:,} bytes" in DOCUMENT
+    assert f"ceil(P / {BLOCK})" in DOCUMENT
+    assert f"`STEPS {STEPS}`" in DOCUMENT
 
 
 BUFFERS = {
-    "count": "Counts", "z_min": "Nearest", "z_max": "Farthest", "nearest_colour": "NearestColour",
-    "DepthBins": "DepthBins", "Curves": "Curves", "State": "State", "List": "List", "Blocks": "Blocks",
-    "Offsets": "Offsets", "Slots": "Slots", "Depths": "Depths", "Colours": "Colours",
+    "found": {"TileRange", "Found"}, "ranges": {"TileRange"}, "counts": {"Counts", "Cursors"}, "State": {"State"},
+    "Curves": {"Curves"}, "Blocks": {"Blocks"}, "Offsets": {"Offsets"}, "Pool": {"Pool", "Colours"},
+    "the": {"Pixels"}, "answers": {"Answers", "Features"},
 }  # fmt: skip
-"""What the document binds -> the name of its block in the shaders."""
+"""What the document binds -> the names of its block in the shaders."""
 
 
 def bindings(shader: str) -> set[tuple[int, str]]:
@@ -109,18 +136,20 @@ def bindings(shader: str) -> set[tuple[int, str]]:
 @pytest.mark.parametrize(
     ("number", "shaders"),
     [
-        (2, ["count/count.frag"]),
-        (4, ["gather/gather.frag"]),
-        (5, ["allocation/state.glsl", "allocation/count.comp"]),
-        (5, ["allocation/state.glsl", "kbuffer-deep/inputs.glsl", "kbuffer-deep/curves.comp"]),
-        (
-            7,
-            ["kbuffer/chain.frag", "kbuffer/chain_colour.frag", "kbuffer/chain_depth.frag", "kbuffer/tail_weight.glsl"],
-        ),
+        (2, ["range/range.frag", "range/fill.comp"]),
+        (3, ["gather/bins.frag", "common/tile_range.glsl"]),
+        (4, ["common/tile_range.glsl"]),
+        (5, ["allocation/state.glsl", "allocation/bins.glsl", "kbuffer-deep/inputs.glsl", "kbuffer-deep/curves.comp"]),
+        (5, ["allocation/count.comp", "allocation/blocks.comp", "allocation/scan.comp", "allocation/place.comp"]),
+        (7, ["kbuffer-deep/capture.frag", "common/tile_range.glsl"]),
+        (8, ["kbuffer-deep/sort.comp"]),
+        (9, ["kbuffer/resolve.frag", "kbuffer-deep/predict.comp", "common/tile_range.glsl", "allocation/bins.glsl"]),
     ],
 )
 def test_bindings_are_those_of_the_shaders(number: int, shaders: list[str]) -> None:
     part = re.split(r"^\d\. \*\*", FRAME, flags=re.MULTILINE)[number]
-    documented = {(int(i), BUFFERS[name]) for i, name in re.findall(r"\[(\d)\]\s(\w+)", part) if name in BUFFERS}
+    documented = {
+        (int(i), block) for i, name in re.findall(r"\[(\d)\]\s(\w+)", part) for block in BUFFERS.get(name, set())
+    } | {(7, "TileRange") for _ in re.findall(r"\[7\] and textures as there", part)}
     own = set().union(*(bindings(shader) for shader in shaders))
-    assert own - {(4, "NearestFacing")} <= documented
+    assert own <= documented

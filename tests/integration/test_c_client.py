@@ -1,4 +1,4 @@
-"""The C header compiled with a C and a C++ compiler, against bundles of this export: answers, slots, hostile files."""
+"""The C header compiled with a C and a C++ compiler, against bundles of this export: answers, cuts, hostile files."""
 
 from __future__ import annotations
 
@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from support.dumps import random_dump
 from support.training import random_weights
 
-from renderer.allocation.fill import solve_lambda
-from renderer.allocation.lattice import MOST_FRAGMENTS, curves_of, price, solve_on_lattice
+from renderer.allocation.cuts import Cuts, events_of, importance_curve, solve_cuts
 from renderer.features import FEATURES, derive, gather
 from schemas.bundle import MANIFEST, UBO_DATA, WEIGHTS, WGSL, ParityReport, Provenance, TailSpec, file_spec
-from schemas.tail import TailName
+from schemas.tail import TAILS, TailName
 from trainer.bundle import Description, load_bundle, write_bundle
 from trainer.weights import Weights
 
@@ -35,25 +34,25 @@ pytestmark = pytest.mark.skipif(
 )
 
 NETWORKS: dict[str, tuple[Weights, TailName]] = {
-    "default": (random_weights(1), "density-16"),
-    "paper": (random_weights(2, FEATURES[:12], (128, 64), "importance", ("importance",)), "weighted-average"),
-    "g": (random_weights(3, FEATURES[3:30], (64, 32), outputs=("a", "b", "g")), "density"),
-    "linear": (random_weights(4, FEATURES[:3], ()), "density-8"),
+    "default": (random_weights(1), "binned-12"),
+    "importance": (random_weights(2, FEATURES[:12], (128, 64), "importance", ("importance",)), "binned-16"),
+    "g": (random_weights(3, FEATURES[3:30], (64, 32), outputs=("a", "b", "g")), "density-16"),
+    "linear": (random_weights(4, FEATURES[:3], ()), "binned-8"),
 }
 
 
 @pytest.fixture(scope="module")
 def sums() -> NDArray[np.float32]:
-    """Raw sums of pixels with fragments, float32 [pixels, 44]."""
+    """Raw sums of pixels with fragments, float32 [pixels, 48]."""
     dump = random_dump(40, 40, 12, seed=1)
-    return gather(dump, bins=16)[dump.counts > 0]
+    return gather(dump, "binned-16")[dump.counts > 0]
 
 
 def export(folder: Path, weights: Weights, tail: TailName, features: NDArray[np.float32]) -> Path:
     """A bundle whose forms nobody compared: that takes a GL context and is tested elsewhere."""
     provenance = Provenance(scenes={}, code_version="0", seed=0, machine='a "machine" \\ ö')
-    described = Description("glass", TailSpec(name=tail, g=0.75), "display", 1, provenance, {"deep": [[[1.5e-3]]]})
-    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver="none")
+    described = Description("glass", TailSpec(name=tail, g=0.75), "display", provenance, {"deep": [[[1.5e-3]]]})
+    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, torch_ubo=0.0, driver="none")
     write_bundle(folder, weights, described, features, lambda: parity)
     return folder
 
@@ -89,7 +88,7 @@ def test_the_example_tests_a_bundle(bundles: dict[str, Path], tmp_path: Path, co
         done = subprocess.run([program, folder], capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
         weights, tail = NETWORKS[name]
-        assert f"glass: tail {tail}, metric display, 11 files\n" in done.stdout
+        assert f"glass: tail {tail} of {TAILS[tail].bins} bins, metric display, 11 files\n" in done.stdout
         assert f"reads: {' '.join(weights.features)}\n" in done.stdout
         assert f"answers: {' '.join(weights.outputs)}\nself-test: passed\n" in done.stdout
     assert subprocess.run([program, tmp_path], capture_output=True, text=True).stderr.startswith("there is no manifest")
@@ -104,7 +103,6 @@ def test_features_and_answers_are_those_of_the_trainer(
     rows.tofile(tmp_path / "sums")
     assert probe("features", bundles[name], tmp_path / "sums", tmp_path / "features") == ""
     found = np.fromfile(tmp_path / "features", np.float32).reshape(len(rows), -1)
-    # Both round every product by itself, so that the spreads agree too.
     np.testing.assert_allclose(found, derive(rows)[:, weights.columns], rtol=1e-5, atol=1e-5)
 
     found[:, 0] *= 100.0  # beyond what normalised features are clamped to
@@ -124,68 +122,59 @@ def test_features_that_are_not_finite_have_no_answer(
     assert probe("predict", bundles["default"], tmp_path / "rows", tmp_path / "answers") == "refused 1\nrefused 3\n"
 
 
-Problem = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint32]]
+Problem = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]
 
 
-def solved(probe: Callable[..., str], folder: Path, problem: Problem, budget: int) -> tuple[NDArray[np.uint32], str]:
+def cuts_of(probe: Callable[..., str], folder: Path, problem: Problem, budget: int) -> tuple[Cuts, int]:
+    """What the client finds, and the sum that it says."""
+    pixels, bins = problem[2].shape
     (folder / "curves").write_bytes(b"".join(part.tobytes() for part in problem))
-    said = probe("solve", len(problem[2]), budget, folder / "curves", folder / "k")
-    return np.fromfile(folder / "k", np.uint32), said
+    complete, rank, total = map(int, probe("cuts", pixels, bins, budget, folder / "curves", folder / "cuts").split())
+    cut, k = np.fromfile(folder / "cuts", np.int32).reshape(2, -1)
+    return Cuts(cut, k, None if complete else rank), total
 
 
-def curves(seed: int, spread: float, most: int) -> Problem:
+def curves(seed: int, spread: float, most: int, bins: int = 12) -> Problem:
     rng = np.random.default_rng(seed)
-    n = rng.integers(0, most, 3000)
-    a, b = rng.normal(-8.0, spread, len(n)), 0.02 + rng.exponential(0.3, len(n))
-    return a.astype(np.float32), b.astype(np.float32), n.astype(np.uint32)
+    counts = rng.integers(0, most, (3000, bins)) * (rng.random((3000, bins)) < 0.4)
+    a, b = rng.normal(-8.0, spread, len(counts)), 0.02 + rng.exponential(0.3, len(counts))
+    return a.astype(np.float32), b.astype(np.float32), np.minimum(counts, 255).astype(np.uint8)
+
+
+OVERFLOWED = curves(5, 3.0, 9)
+OVERFLOWED[0][:6], OVERFLOWED[1][2:8] = (np.nan, np.inf, -np.inf, 0.0, np.nan, 1e30), (np.nan, np.inf, 1e-9, 1, 1, 1)
 
 
 @pytest.mark.parametrize(
     "problem",
     [
-        pytest.param(curves(1, 3.0, 12), id="usual"),
-        pytest.param(curves(2, 0.0, 3), id="ties"),
-        pytest.param(curves(3, 1e30, 40), id="steep"),
-        pytest.param((*curves(4, 3.0, 5)[:2], curves(4, 3.0, 2 * MOST_FRAGMENTS)[2]), id="deep"),
-        pytest.param(tuple(x[:1] for x in curves(5, 1.0, 9)), id="one pixel"),
+        pytest.param(curves(1, 3.0, 4), id="usual"),
+        pytest.param(curves(2, 0.0, 2, bins=16), id="ties"),
+        pytest.param(curves(3, 1e30, 40, bins=8), id="steep"),
+        pytest.param(curves(4, 3.0, 300), id="deep"),
+        pytest.param(OVERFLOWED, id="overflowed"),
+        pytest.param(tuple(x[:1] for x in curves(6, 1.0, 9)), id="one pixel"),
+        pytest.param((*curves(7, 1.0, 9)[:2], np.zeros((3000, 8), np.uint8)), id="empty"),
     ],
 )
-def test_slots_are_those_of_the_shaders_twin(probe: Callable[..., str], tmp_path: Path, problem: Problem) -> None:
-    a, b, n = problem
-    usable = int(np.minimum(n, MOST_FRAGMENTS).sum(dtype=np.int64))
-    occupied = np.count_nonzero(n)
-    for budget in {0, max(occupied - 1, 0), occupied, usable // 3, usable // 2, max(usable - 1, 0), usable, 2 * usable}:
-        k, said = solved(probe, tmp_path, problem, budget)
-        expected = solve_on_lattice(curves_of(a, b), n, budget)
-        np.testing.assert_array_equal(k, expected.k)
-        assert k.sum(dtype=np.int64) == min(budget, usable)
-        k_min, complete, index, log_lambda, total = said.split()
-        assert int(total) == min(budget, usable)
-        assert (int(complete), int(k_min)) == (expected.index is None, budget >= occupied)
-        if expected.index is not None:
-            assert int(index) == expected.index
-            assert float(log_lambda) == -price(expected.index)
+def test_cuts_are_those_of_the_shaders_twin(probe: Callable[..., str], tmp_path: Path, problem: Problem) -> None:
+    events = events_of(*problem)
+    usable = int(events.growth.sum())
+    for budget in {0, 1, usable // 3, usable // 2, max(usable - 1, 0), usable, 2 * usable}:
+        found, total = cuts_of(probe, tmp_path, problem, budget)
+        expected = solve_cuts(events, budget)
+        np.testing.assert_array_equal(found.cut, expected.cut)
+        np.testing.assert_array_equal(found.k, expected.k)
+        assert found.rank == expected.rank
+        assert total == found.k.sum() <= budget
 
 
-def test_slots_are_near_those_at_the_exact_lambda(probe: Callable[..., str], tmp_path: Path) -> None:
-    problem = curves(6, 3.0, 20)
-    budget = int(problem[2].sum()) // 3
-    k, said = solved(probe, tmp_path, problem, budget)
-    exact, log_lambda = solve_lambda(*problem, budget, 1)
-    assert abs(float(said.split()[3]) - log_lambda) <= 2**-10  # one step of the prices
-    assert np.abs(k - exact).max() <= 1
-    assert np.count_nonzero(k != exact) <= 1e-3 * len(k) + 8
-
-
-def test_a_curve_that_is_not_one_is_refused(probe: Callable[..., str], tmp_path: Path) -> None:
-    a, b = np.zeros(3, np.float32), np.ones(3, np.float32)
-    n = np.array([0, 1, 5], np.uint32)
-    (tmp_path / "k").touch()
-    for value in (np.nan, np.inf, 0.0, -1.0):
-        b[:2], b[2] = np.nan, value  # the first two have no choice
-        assert "gain curve of pixel 2" in solved(probe, tmp_path, (a, b, n), 3)[1]
-    b[2] = 1.0
-    assert solved(probe, tmp_path, (a, b, n), 3)[0].tolist() == [0, 1, 2]
+def test_curves_of_importances_are_those_of_the_renderer(probe: Callable[..., str], tmp_path: Path) -> None:
+    importances = np.array([0.0, 1e-30, 0.1, 0.5, 1.0, np.nan], np.float32)
+    importances.tofile(tmp_path / "importances")
+    probe("importances", tmp_path / "importances", tmp_path / "curves")
+    found = np.fromfile(tmp_path / "curves", np.float32).reshape(-1, 2)
+    np.testing.assert_array_equal(found, np.stack(importance_curve(importances), axis=1))
 
 
 # What is wrong with a bundle -> what the reader says.
@@ -236,12 +225,13 @@ DAMAGED: dict[str, tuple[Damage, str]] = {
     "huge": (text(lambda whole: whole + " " * (1 << 20)), "more than 1048576 bytes"),
     "an array": (text(lambda _: "[1]"), "keys of a bundle"),
     "unknown key": (set_to(1, "extra"), "keys of a bundle"),
-    "key twice": (text(lambda whole: whole.replace('"k_min"', '"k_min": 1, "k_min"')), "keys of a bundle"),
+    "key twice": (text(lambda whole: whole.replace('"metric"', '"metric": "display", "metric"')), "keys of a bundle"),
     "key missing": (edit(lambda manifest: manifest.pop("layers")), "keys of a bundle"),
     "format": (set_to("diaphane-bundle/3", "format"), "update this reader"),
     "name": (set_to("../glass", "name"), "name"),
     "long name": (set_to("g" * 65, "name"), "name"),
     "tail": (set_to("density-32", "tail", "name"), "tail"),
+    "tail without bins": (set_to("density", "tail", "name"), "without depth bins"),
     "head": (set_to("gain", "head"), "head"),
     "outputs": (set_to(["b", "a"], "outputs"), "outputs"),
     "feature": (set_to("colour", "features", 0, "name"), "feature 0"),
@@ -305,7 +295,7 @@ def test_a_wrong_weight_fails_the_self_test(
     assert probe("check", folder).startswith("ok glass: row 0, output")
 
 
-@pytest.mark.parametrize("name", ["default", "paper"])
+@pytest.mark.parametrize("name", ["default", "importance"])
 def test_hundreds_of_mutations_end_without_a_fault(
     bundles: dict[str, Path], probe: Callable[..., str], name: str
 ) -> None:

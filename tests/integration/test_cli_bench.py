@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +16,20 @@ import pytest
 
 import services
 from benchmarks import suite
+from benchmarks.casting.cases import Case
 from benchmarks.comparing import scenes
-from benchmarks.comparing.scenes import PATH_FRAMES, SHARED
+from benchmarks.comparing.scenes import PATH_FRAMES, SHARED, cases_of, parts_of
+from renderer import capture, exact_bytes
 from renderer.samples import SAMPLES
+from renderer.samples.deep import DEEP
+from renderer.techniques import bands
 from schemas.bench import BenchResult
 from schemas.bundle import load_manifest
+from schemas.limits import LIMITS
 from schemas.problem import ExitCode
 from services.bench.kept import ROWS
 from services.cli.app import run
+from services.summary import UNFIT, said_unfit
 
 ROOT = Path(services.__file__).parent.parent
 FAST = ["--size", "48x32", "--repeats", "1", "--alpha", ".33", "--equal-fragments"]
@@ -182,7 +189,15 @@ def test_the_suite_publishes_its_results_and_a_page(
     monkeypatch.setattr("sys.argv", ["suite", *options, "--repeats", "1", "--scenes", "nowhere"])
     assert suite.main() == 0
     page = (folder / "BENCH.md").read_text()
-    for heading in ("Figure 6", "Table 1", "Table 2", "Score q", "Every technique", "Where each wins"):
+    for heading in (
+        "How deep the scenes are",
+        "Figure 6",
+        "Table 1",
+        "Table 2",
+        "Score q",
+        "Every technique",
+        "Where each wins",
+    ):
         assert f"### {heading}" in page
     (lines,) = (folder / "results").glob("bench-*.jsonl")
     result = suite.read_lines(lines)
@@ -203,6 +218,55 @@ def test_the_suite_publishes_its_results_and_a_page(
     assert suite.main() == 1
 
 
+def test_exact_techniques_say_what_they_would_need_where_they_do_not_fit(
+    scene: Path, folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bands, "MOST_FRAGMENTS", 3)
+    monkeypatch.setattr(exact_bytes, "LIMITS", replace(LIMITS, buffer_bytes=1000))
+    command = [str(scene), *FAST, "-o", "out", "-t", "sbuffer,abuffer-array,kbuffer", "--budgets", ".01"]
+    (view,) = answer(capsys, *command)["views"]
+    cells = {cell["technique"]: cell for cell in view["cells"]}
+    assert cells["abuffer-array"]["problem"].startswith("A pixel has")
+    assert cells["abuffer-array"]["pool_bytes"] == 8 * view["most"] * 48 * 32
+    assert cells["abuffer-array"]["total_bytes"] == cells["abuffer-array"]["pool_bytes"] + 20 * 48 * 32
+    assert cells["sbuffer"]["pool_bytes"] == 8 * view["fragments"]
+    assert cells["sbuffer"]["frame"]["median"] > 0.0, "in bands it is rendered all the same"
+    assert [cells[name].get("fits", True) for name in ("abuffer-array", "sbuffer", "kbuffer")] == [False, False, True]
+    assert run(["bench", *command]) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert "A pixel has" in out
+    assert f" KiB {UNFIT}" in out
+    assert said_unfit() in out
+    assert said_unfit() in (folder / "out" / "index.html").read_text()
+
+
+def test_a_view_with_too_many_fragments_for_an_exact_picture_has_the_bytes_all_the_same(
+    scene: Path, folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(capture, "LIMITS", replace(LIMITS, fragments=100))
+    (view,) = answer(capsys, str(scene), *FAST, "-o", "out", "-t", "sbuffer,kbuffer", "--budgets", "1")["views"]
+    assert view["fragments"] > 100
+    exact, bounded = view["cells"]
+    assert "the limit is 100" in exact["problem"]
+    assert exact["pool_bytes"] == 8 * view["fragments"]
+    assert "the limit is 100" in bounded["problem"]
+    assert "total_bytes" not in bounded
+    assert run(["bench", str(scene), *FAST, "-o", "out", "-t", "sbuffer,kbuffer", "--budgets", "1"]) == ExitCode.OK
+
+
+def test_deep_scenes_are_a_group_that_is_measured_as_authored() -> None:
+    assert {case.scene for case in cases_of(Path("nowhere"), Path(), only=[])} == set()
+    cases = [Case(name, Path(name)) for name in ("bottles", "fur")]
+    parts = list(parts_of(cases))
+    assert [(part.alpha, part.size) for part in parts if part.case.scene == "fur"] == [(None, scenes.SIZES[0])]
+    assert [part.case.scene for part in parts[:3]] == ["bottles", "fur", "bottles"]
+    assert len(parts) == len(scenes.ALPHAS) * len(scenes.SIZES) + 1
+    assert parts[0].measures("depth-peeling")
+    assert not parts[1].measures("depth-peeling")
+    assert parts[1].measures("abuffer-array")
+    assert scenes.selected(["deep", "sponza"]) == {*DEEP, "sponza"}
+
+
 def test_the_suites_bundle_was_trained_on_none_of_its_scenes() -> None:
     manifest = load_manifest(suite.BUNDLE)
-    assert not {*SHARED, *SAMPLES} & set(manifest.provenance.scenes)
+    assert not {*SHARED, *SAMPLES, *DEEP} & set(manifest.provenance.scenes)

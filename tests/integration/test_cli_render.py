@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -14,18 +15,21 @@ from PIL import Image
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 from support.training import export_random, random_weights, real_features
 
+from renderer import exact_bytes
 from renderer.deep_exr import read_deep_exr
 from renderer.dump import read_dump
 from renderer.exr import read_exr
 from renderer.frame import Frame
-from renderer.techniques import TECHNIQUES, Budget, Entry, Rendered
+from renderer.techniques import TECHNIQUES, Budget, Entry, Rendered, bands
 from schemas.colour import display8
+from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 from services.cli.app import run
 from services.database import open_database
 from services.registry import open_registry
 from services.settings import Settings
 from services.storage import open_storage
+from services.summary import said_unfit
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "scenes"
 
@@ -120,6 +124,27 @@ def test_every_technique_writes_a_file_of_its_own_and_says_what_it_cost(
     assert by_name["kbuffer-optimal"]["captured"] <= 0.5 * 48 * 32
     assert 0.0 < by_name["kbuffer-optimal"]["mse"] <= by_name["kbuffer-importance"]["mse"]
     assert by_name["kbuffer"]["k"] == [0, 0]
+
+
+def test_an_exact_technique_that_cannot_render_a_view_says_what_it_would_need(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bands, "MOST_FRAGMENTS", 0)
+    monkeypatch.setattr(exact_bytes, "LIMITS", replace(LIMITS, buffer_bytes=1000))
+    options = ["render", "panes.usda", "-t", "all", "-w", "48"]
+    found = {picture["technique"]: picture for picture in answer(capsys, *options)["pictures"]}
+    arrays, exact = found["abuffer-array"], found["sbuffer"]
+    assert arrays["problem"].startswith("A pixel has")
+    assert arrays["fragments"] == exact["fragments"] > 0
+    assert arrays["pool_bytes"] >= 8 * exact["fragments"]
+    assert arrays["total_bytes"] == arrays["pool_bytes"] + 48 * 32 * arrays["pixel_bytes"]
+    assert not (folder / arrays["file"]).exists()
+    assert (folder / exact["file"]).exists()
+    assert [found[name]["fits"] for name in ("abuffer-array", "sbuffer", "weighted-average")] == [False, False, True]
+    assert run(options) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert "it would need pool" in out
+    assert said_unfit() in out
 
 
 def test_what_exceeds_the_limits_is_left_out_among_others_and_a_problem_alone(

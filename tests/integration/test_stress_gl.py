@@ -29,9 +29,7 @@ def test_every_technique_and_tail_is_there(rows: list[Row]) -> None:
             assert paths >= (expected or {f"{name} · {driver}"})
         assert paths >= {f"{path} · {driver}" for path in ("capture.bits", "gather", "features", "predict.glsl")}
         assert paths >= {f"{path} · {driver}" for path in ("gather.half", "bins.shares", "features.front")}
-        assert paths >= {
-            f"kbuffer-deep.{form}.F, K and k_min · {driver}" for form in ("binned sums", "overflowing network")
-        }
+        assert paths >= {f"kbuffer-deep.{form}.F and K · {driver}" for form in ("binned sums", "overflowing network")}
     cases = {row.case for row in rows if isinstance(row, Finding) and row.path == "sbuffer · llvmpipe"}
     assert cases == {"n up to 96", "n 4096"}
 

@@ -59,7 +59,7 @@ def bundles(frame: Frame, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
     """A bundle for every tail, with the same network, that for the default tail `glass`; and one of importances."""
     first = tmp_path_factory.mktemp("bundle")
     provenance = Provenance(scenes={}, code_version="0", seed=0, machine="test")
-    described = Description("glass", TailSpec(name=DEFAULT_TAIL, g=0.75), "display", 1, provenance, {})
+    described = Description("glass", TailSpec(name=DEFAULT_TAIL, g=0.75), "display", provenance, {})
     parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, driver="none")
     features = derive(gather(capture(frame).dump, bins=16))
     manifest = write_bundle(first, random_weights(11), described, features, lambda: parity)

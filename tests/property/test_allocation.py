@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from support.dumps import random_dump
 
 from labeller.allocation import RULES, RuleName
-from labeller.curves import error_curves
+from labeller.curves import UNREACHABLE, error_curves, whole_bins
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
 from schemas.fragments import FragmentDump
-from schemas.tail import METRICS, TAILS, MetricName, TailName
+from schemas.tail import BINNED_TAILS, METRICS, TAIL_NAMES, MetricName, TailName
 
 pytestmark = pytest.mark.usefixtures("single_thread")
 
@@ -35,7 +35,7 @@ def budgets_of(dump: FragmentDump) -> list[int]:
 
 
 @settings(max_examples=60, deadline=None)
-@given(dumps, st.sampled_from(RULES), st.sampled_from(TAILS), st.sampled_from(METRICS))
+@given(dumps, st.sampled_from(RULES), st.sampled_from(TAIL_NAMES), st.sampled_from(METRICS))
 def test_every_allocation_keeps_its_limits(
     dump: FragmentDump, rule: RuleName, tail: TailName, metric: MetricName
 ) -> None:
@@ -44,8 +44,6 @@ def test_every_allocation_keeps_its_limits(
         assert found.used == found.k.sum() <= found.budget
         assert (found.k <= dump.counts).all()
         assert found.k.min(initial=0) >= 0
-        if rule not in ("fixed", "dynamic"):
-            assert (found.k >= np.minimum(dump.counts, found.k_min)).all()
         if rule in spending:
             assert found.used == min(found.budget, dump.total)
         assert np.isfinite(found.error)
@@ -54,7 +52,7 @@ def test_every_allocation_keeps_its_limits(
 
 
 @settings(max_examples=60, deadline=None)
-@given(dumps, st.sampled_from(TAILS))
+@given(dumps, st.sampled_from(TAIL_NAMES))
 def test_nothing_is_better_than_optimal_and_nothing_beats_its_bound(dump: FragmentDump, tail: TailName) -> None:
     curves, budgets = error_curves(dump, tail), budgets_of(dump)
     optimal = allocate_curves(dump, curves, budgets, "optimal")
@@ -63,39 +61,58 @@ def test_nothing_is_better_than_optimal_and_nothing_beats_its_bound(dump: Fragme
             assert best.bound <= best.error
             if rule in ("greedy", "increment"):
                 assert best.error <= other.error * (1 + 1e-12)
-            if other.k_min == best.k_min and (other.k >= np.minimum(dump.counts, best.k_min)).all():
-                assert best.bound <= other.error * (1 + 1e-12)
+            assert best.bound <= other.error * (1 + 1e-12)
 
 
-@settings(max_examples=40, deadline=None)
-@given(dumps)
-def test_the_bound_does_not_rise_with_the_budget(dump: FragmentDump) -> None:
-    curves = error_curves(dump)
-    found = allocate_curves(dump, curves, budgets_of(dump), "optimal")
-    for k_min in (0, 1):
-        bounds = np.array([x.bound for x in found if x.k_min == k_min])
-        assert (np.diff(bounds) <= 1e-12 * bounds[:-1]).all() if len(bounds) else True
+@settings(max_examples=100, deadline=None)
+@given(dumps, st.sampled_from(TAIL_NAMES), st.lists(st.floats(0.0, 1.1), max_size=8))
+def test_neither_the_optimums_error_nor_its_bound_rises_with_the_budget(
+    dump: FragmentDump, tail: TailName, shares: list[float]
+) -> None:
+    budgets = sorted({*budgets_of(dump), *(int(share * dump.total) for share in shares)})
+    found = allocate_curves(dump, error_curves(dump, tail), budgets, "optimal")
+    for values in ([x.error for x in found], [x.bound for x in found]):
+        here = np.array(values)
+        assert (here[1:] <= here[:-1] * (1 + 1e-12)).all()
 
 
 @settings(max_examples=60, deadline=None)
-@given(dumps, st.sampled_from([0, 1]), st.sampled_from(TAILS))
-def test_hulls_are_convex_and_below_their_curves(dump: FragmentDump, k_min: int, tail: TailName) -> None:
+@given(dumps, st.sampled_from(BINNED_TAILS), st.lists(st.floats(0.0, 1.1), max_size=8))
+def test_the_optimum_of_whole_bins_never_rises_with_the_budget_nor_beats_any_ks_bound(
+    dump: FragmentDump, tail: TailName, shares: list[float]
+) -> None:
+    budgets = sorted({*budgets_of(dump), *(int(share * dump.total) for share in shares)})
     curves = error_curves(dump, tail)
-    hulls = lower_hulls(curves, k_min)
+    cuts = whole_bins(dump, curves)
+    found, free = (allocate_curves(dump, each, budgets, "optimal") for each in (cuts, curves))
+    for values in ([x.error for x in found], [x.bound for x in found]):
+        here = np.array(values)
+        assert (here[1:] <= here[:-1] * (1 + 1e-12)).all()
+    for of_cuts, of_any in zip(found, free, strict=True):
+        assert of_cuts.used <= of_cuts.budget
+        assert (cuts.at(of_cuts.k) < UNREACHABLE).all()
+        assert of_any.bound <= of_cuts.error * (1 + 1e-12)
+
+
+@settings(max_examples=60, deadline=None)
+@given(dumps, st.sampled_from(TAIL_NAMES))
+def test_hulls_are_convex_and_below_their_curves(dump: FragmentDump, tail: TailName) -> None:
+    curves = error_curves(dump, tail)
+    hulls = lower_hulls(curves)
     for p in range(dump.pixels):
         curve = curves.error[curves.offsets[p] : curves.offsets[p + 1]].astype(np.float64)
         k = hulls.k[hulls.offsets[p] : hulls.offsets[p + 1]]
         error = hulls.error[hulls.offsets[p] : hulls.offsets[p + 1]].astype(np.float64)
         if not len(k):
-            assert len(curve) - 1 <= k_min or curve[k_min] == 0.0
+            assert curve[0] == 0.0
             continue
-        assert (k[0], error[-1]) == (k_min, 0.0)
+        assert (k[0], error[-1]) == (0, 0.0)
         assert np.array_equal(error, curve[k])
         slopes = -np.diff(error) / np.diff(k)
         assert (slopes > 0.0).all()
         assert (np.diff(slopes) <= 1e-12 * slopes[:-1]).all()
-        between = np.interp(np.arange(k_min, len(curve)), k, error)
-        assert (between <= curve[k_min:] * (1 + 1e-9) + 1e-30).all()
+        between = np.interp(np.arange(len(curve)), k, error)
+        assert (between <= curve * (1 + 1e-9) + 1e-30).all()
 
 
 def test_the_error_does_not_rise_with_the_budget_on_a_view() -> None:

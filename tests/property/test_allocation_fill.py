@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from renderer.allocation.fill import budget_fill, feasible_k_min, solve_lambda
+from renderer.allocation.fill import budget_fill, solve_lambda
 
 pytestmark = pytest.mark.usefixtures("single_thread")
 
@@ -18,8 +18,8 @@ gain = st.one_of(st.sampled_from([0.0, -5.0]), st.floats(-200.0, 200.0, width=32
 decay = st.one_of(st.sampled_from([0.5, 1.0]), st.floats(0.03125, 300.0, width=32))
 
 
-def limits_hold(k: np.ndarray, n: np.ndarray, budget: int, k_min: int) -> bool:
-    return bool(k.sum() == min(budget, n.sum()) and (k >= np.minimum(k_min, n)).all() and (k <= n).all())
+def limits_hold(k: np.ndarray, n: np.ndarray, budget: int) -> bool:
+    return bool(k.sum() == min(budget, n.sum()) and (k >= 0).all() and (k <= n).all())
 
 
 @settings(max_examples=300, deadline=None)
@@ -28,13 +28,12 @@ def test_the_budget_fill_is_exact_and_monotone_in_the_weights(lists: list[int], 
     n = np.array(lists)
     weights = np.array([data.draw(weight) for _ in lists], dtype=np.float32)
     budget = data.draw(st.integers(0, int(1.2 * n.sum()) + 1))
-    k_min = feasible_k_min(n, budget)
-    k = budget_fill(weights, n, budget, k_min)
-    assert limits_hold(k, n, budget, k_min)
+    k = budget_fill(weights, n, budget)
+    assert limits_hold(k, n, budget)
     for p in range(len(n)):
         for q in range(len(n)):
             if weights[p] > weights[q]:  # a heavier pixel has at least as much, if it has as many fragments
-                assert k[p] >= min(k[q], n[p]) or k[q] <= k_min
+                assert k[p] >= min(k[q], n[p])
 
 
 @settings(max_examples=300, deadline=None)
@@ -44,12 +43,11 @@ def test_the_price_is_exact_and_its_counts_are_those_of_the_formula(lists: list[
     a = np.array([data.draw(gain) for _ in lists], dtype=np.float32)
     b = np.array([data.draw(decay) for _ in lists], dtype=np.float32)
     budget = data.draw(st.integers(0, int(1.2 * n.sum()) + 1))
-    k_min = feasible_k_min(n, budget)
-    k, log_lambda = solve_lambda(a, b, n, budget, k_min)
-    assert limits_hold(k, n, budget, k_min)
+    k, log_lambda = solve_lambda(a, b, n, budget)
+    assert limits_hold(k, n, budget)
 
     a, b = a.astype(np.float64), b.astype(np.float64)
-    at_price = np.clip(np.floor(1.5 + (a - log_lambda) / b), np.minimum(k_min, n), n)
+    at_price = np.clip(np.floor(1.5 + (a - log_lambda) / b), 0, n)
     assert (at_price <= k).all()
     # The remainder went, one each, to pixels that grow at the next price: to no others, and to the first of them.
     grew, could = k > at_price, at_price < n
@@ -64,7 +62,7 @@ def test_the_price_is_exact_and_its_counts_are_those_of_the_formula(lists: list[
 
 def test_a_million_equal_pixels_share_by_index() -> None:
     n = np.full(1_000_000, 3)
-    k = budget_fill(np.ones(len(n), np.float32), n, 1_234_567, 1)
+    k = budget_fill(np.ones(len(n), np.float32), n, 1_234_567)
     assert k.sum() == 1_234_567
     assert (np.diff(k) <= 0).all()
 
@@ -72,5 +70,5 @@ def test_a_million_equal_pixels_share_by_index() -> None:
 def test_ten_million_small_weights_lose_nothing() -> None:
     rng = np.random.default_rng(0)
     n = rng.integers(0, 4, 10_000_000).astype(np.int32)
-    k = budget_fill(rng.random(len(n), dtype=np.float32) * np.float32(1e-7), n, 12_345_678, 1)
-    assert limits_hold(k, n, 12_345_678, 1)
+    k = budget_fill(rng.random(len(n), dtype=np.float32) * np.float32(1e-7), n, 12_345_678)
+    assert limits_hold(k, n, 12_345_678)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,24 +17,25 @@ from labeller.curves import Curves, error_curves, error_curves_by_g
 from labeller.error_rules import ErrorRule
 from labeller.rules import allocate_curves
 from labeller.streaming import allocate_bands
+from renderer.tile_range import tile_grid, tile_ranges
 from schemas.fragments import FragmentDump
 from schemas.problem import Problem
-from schemas.tail import METRICS, MetricName
+from schemas.tail import METRICS, RANGE_TILE, MetricName
 
 pytestmark = pytest.mark.usefixtures("single_thread")
 
 
-def dual_bound(curves: Curves, lam: float, budget: int, k_min: int) -> float:
+def dual_bound(curves: Curves, lam: float, budget: int) -> float:
     """The dual function at a price, from the whole curves, in plain float64."""
-    least = [min(float(e[k]) + lam * k for k in range(min(k_min, len(e) - 1), len(e))) for e in split(curves)]
+    least = [min(float(e[k]) + lam * k for k in range(len(e))) for e in split(curves)]
     return sum(least) - lam * budget
 
 
-def check(curves: Curves, budgets: list[int], k_min: int) -> list[Allocation]:
-    found = allocate_curves(dump_for(curves), curves, budgets, "optimal", k_min=k_min)
-    rules = [allocate_curves(dump_for(curves), curves, budgets, rule, k_min=k_min) for rule in ("greedy", "increment")]
+def check(curves: Curves, budgets: list[int]) -> list[Allocation]:
+    found = allocate_curves(dump_for(curves), curves, budgets, "optimal")
+    rules = [allocate_curves(dump_for(curves), curves, budgets, rule) for rule in ("greedy", "increment")]
     for x, *others in zip(found, *rules, strict=True):
-        best = reference.optimum(split(curves), x.budget, x.k_min)
+        best = reference.optimum(split(curves), x.budget)
         assert x.bound is not None
         assert x.lam is not None
         assert x.bound <= best * (1 + 1e-12)
@@ -40,7 +43,7 @@ def check(curves: Curves, budgets: list[int], k_min: int) -> list[Allocation]:
         assert x.error == pytest.approx(curves.total(x.k), rel=1e-14)
         assert x.used == x.k.sum() <= x.budget
         # The price alone certifies nearly as much, and anybody can check it without trusting the search.
-        assert dual_bound(curves, x.lam, x.budget, x.k_min) <= best * (1 + 1e-9) + 1e-12
+        assert dual_bound(curves, x.lam, x.budget) <= best * (1 + 1e-9) + 1e-12
         if x.proven:
             assert x.error <= best * (1 + 1e-12) + 1e-300
         for other in others:
@@ -69,7 +72,7 @@ def test_the_bound_never_exceeds_the_optimum_in_three_thousand_random_cases() ->
     for case in range(1500):
         curves = random_curves(rng, case % 6)
         budgets = rng.integers(0, int(curves.counts.sum()) + 1, 2).tolist()
-        proven += [x.proven for x in check(curves, budgets, k_min=case % 2)]
+        proven += [x.proven for x in check(curves, budgets)]
     assert len(proven) == 3000
     assert all(proven)
 
@@ -86,14 +89,14 @@ def test_a_search_that_may_not_look_at_everything_claims_no_more_than_it_saw(
     proven = []
     for case in range(300):
         curves = random_curves(rng, case % 6)
-        proven += [x.proven for x in check(curves, [int(rng.integers(0, int(curves.counts.sum()) + 1))], case % 2)]
+        proven += [x.proven for x in check(curves, [int(rng.integers(0, int(curves.counts.sum()) + 1))])]
     assert 0 < sum(proven) < len(proven)
 
 
 def test_the_one_pixel_that_gains_is_found_among_many_that_could_change_alike() -> None:
     # All steps tie in float32, but the last pixel's saves a little more than those that were taken before it.
     curves = curves_of([*[[1.0, 0.0]] * 30, [1 + 2**-23, 2**-23 - 2e-8, 0.0]])
-    (found,) = check(curves, [10], k_min=0)
+    (found,) = check(curves, [10])
     assert found.k[-1] == 1
 
 
@@ -102,18 +105,29 @@ curve_lists = st.lists(st.lists(errors, max_size=9).map(lambda e: [*e, 0.0]), mi
 
 
 @settings(max_examples=300, deadline=None)
-@given(curve_lists, st.sampled_from([0, 1]), st.data())
-def test_the_bound_never_exceeds_the_optimum(lists: list[list[float]], k_min: int, data: st.DataObject) -> None:
+@given(curve_lists, st.data())
+def test_the_bound_never_exceeds_the_optimum(lists: list[list[float]], data: st.DataObject) -> None:
     budget = data.draw(st.integers(0, sum(len(e) - 1 for e in lists)))
-    check(curves_of(lists), [budget], k_min)
+    check(curves_of(lists), [budget])
+
+
+@settings(max_examples=200, deadline=None)
+@given(curve_lists)
+def test_the_error_of_the_optimum_never_rises_with_the_budget_and_is_never_above_a_greedy_rules(
+    lists: list[list[float]],
+) -> None:
+    curves = curves_of(lists)
+    budgets = list(range(int(curves.counts.sum()) + 2))
+    found = check(curves, budgets)
+    for values in ([x.error for x in found], [x.bound or 0.0 for x in found]):
+        assert all(after <= before * (1 + 1e-12) for before, after in pairwise(values))
 
 
 @pytest.mark.parametrize("seed", range(6))
-@pytest.mark.parametrize("k_min", [0, 1])
-def test_views_of_hundreds_of_pixels_reach_the_optimum_exactly(seed: int, k_min: int) -> None:
+def test_views_of_hundreds_of_pixels_reach_the_optimum_exactly(seed: int) -> None:
     curves = error_curves(random_dump(20, 15, 9, seed=seed))
     total = int(curves.counts.sum())
-    found = check(curves, [int(share * total) for share in (0.25, 0.4, 0.6, 0.8)], k_min)
+    found = check(curves, [int(share * total) for share in (0.25, 0.4, 0.6, 0.8)])
     assert all(x.proven and x.gap == 0.0 for x in found)
 
 
@@ -121,7 +135,7 @@ def test_views_of_hundreds_of_pixels_reach_the_optimum_exactly(seed: int, k_min:
 def test_a_small_loss_next_to_the_cost_of_a_long_list_still_counts(n: int) -> None:
     # Both steps cost the same as far as float32 knows; only the second pixel's leaves nothing behind.
     curves = curves_of([[*[9.0 * n] * n, 1.0, 1e-9, 0.0], [*[9.0 * n] * n, 1.0, 0.0]])
-    (found,) = allocate_curves(dump_for(curves), curves, [2 * n + 1], "optimal", k_min=0)
+    (found,) = allocate_curves(dump_for(curves), curves, [2 * n + 1], "optimal")
     assert found.k.tolist() == [n, n + 1]
     assert found.error == 1.0
     assert found.proven
@@ -132,7 +146,7 @@ def test_the_dual_bound_of_long_lists_is_not_rounded_up(monkeypatch: pytest.Monk
     n, most = 300_000, 9.0 * 300_000
     curves = curves_of([[*[most] * n, 1.0, 0.0]] * 2 + [[*[most] * n, 1 + 2**-23, 2**-23 - 2e-11, 0.0]])
     best = 1.0 + float(np.float32(2**-23 - 2e-11))
-    (found,) = allocate_curves(dump_for(curves), curves, [3 * n + 2], "optimal", k_min=0)
+    (found,) = allocate_curves(dump_for(curves), curves, [3 * n + 2], "optimal")
     assert found.lam == 1.0
     assert 1 - 1e-12 < (found.bound or 0.0) / best <= 1 + 1e-14
     assert not found.proven
@@ -142,27 +156,26 @@ def test_equal_pixels_by_the_thousand_are_no_trouble() -> None:
     # Every step ties with every other and none fits what is left: the worst case of the remainder.
     curves = curves_of([[1.0, 0.95, 0.9, 0.0]] * 5000)
     for budget, error in ((7, 5000 - 2 - 0.05), (9000, 2000.0), (9001, 2000 - 0.05), (9002, 2000 - 0.1), (14999, 0.9)):
-        (found,) = allocate_curves(dump_for(curves), curves, [budget], "optimal", k_min=0)
+        (found,) = allocate_curves(dump_for(curves), curves, [budget], "optimal")
         assert found.error == pytest.approx(error, rel=1e-6)
         assert found.proven
 
 
-@pytest.mark.parametrize("k_min", [0, 1])
-def test_a_picture_of_equal_lists_is_proven(k_min: int) -> None:
+def test_a_picture_of_equal_lists_is_proven() -> None:
     rng = np.random.default_rng(4)
     kinds = [(rng.integers(1, 255, (40, 4), dtype=np.uint8), np.arange(1, 41, dtype=np.float32)) for _ in range(3)]
     curves = error_curves(dump_of([kinds[i % 3] for i in range(3000)]))
     total = int(curves.counts.sum())
     budgets = [int(share * total) + 1 for share in (0.25, 0.4, 0.6, 0.8)]
-    for found in allocate_curves(dump_for(curves), curves, budgets, "optimal", k_min=k_min):
+    for found in allocate_curves(dump_for(curves), curves, budgets, "optimal"):
         assert found.proven
-        assert dual_bound(curves, found.lam or 0.0, found.budget, k_min) <= found.error * (1 + 1e-9)
+        assert dual_bound(curves, found.lam or 0.0, found.budget) <= found.error * (1 + 1e-9)
 
 
 dumps = st.builds(
     random_dump,
     width=st.integers(1, 6),
-    height=st.integers(1, 12),
+    height=st.integers(1, 40),
     max_n=st.sampled_from([0, 1, 3, 12]),
     seed=st.integers(0, 2**16),
     alpha=st.sampled_from([None, 1 / 255, 0.5]),
@@ -170,8 +183,8 @@ dumps = st.builds(
 
 
 def bands_of(dump: FragmentDump, rows: int) -> list[FragmentDump]:
-    """A view's row bands of some rows each."""
-    made = []
+    """A view's row bands of some rows each, whole tiles, with their tiles' ranges."""
+    made, columns, ranges = [], tile_grid(dump.width, dump.height)[0], tile_ranges(dump)
     for y in range(0, dump.height, rows):
         p, q = y * dump.width, min(y + rows, dump.height) * dump.width
         i, j = dump.offsets[p], dump.offsets[q]
@@ -179,29 +192,30 @@ def bands_of(dump: FragmentDump, rows: int) -> list[FragmentDump]:
             FragmentDump(
                 *(dump.width, (q - p) // dump.width, dump.offsets[p : q + 1] - i),
                 *(dump.rgba[i:j], dump.depth[i:j], dump.background[p:q], dump.facing[p:q]),
+                tile_range=ranges[y // RANGE_TILE * columns : -(-(y + rows) // RANGE_TILE) * columns],
             )
         )
     return made
 
 
 @settings(max_examples=80, deadline=None)
-@given(dumps, st.integers(1, 5), st.sampled_from(["optimal", "greedy", "increment"]), st.sampled_from([0, 1]))
-def test_row_bands_give_what_the_whole_view_gives(dump: FragmentDump, rows: int, rule: ErrorRule, k_min: int) -> None:
+@given(dumps, st.sampled_from([8, 16, 24]), st.sampled_from(["optimal", "greedy", "increment"]))
+def test_row_bands_give_what_the_whole_view_gives(dump: FragmentDump, rows: int, rule: ErrorRule) -> None:
     occupied, total = int(np.count_nonzero(dump.counts)), dump.total
     budgets = [max(0, F) for F in (0, occupied - 1, occupied, total // 2, total // 2, total - 1, total + 3)]
     bands = bands_of(dump, rows)
-    whole = allocate_curves(dump, error_curves(dump), budgets, rule, k_min=k_min)
-    for found, expected in zip(allocate_bands(lambda: iter(bands), budgets, rule, k_min=k_min), whole, strict=True):
+    whole = allocate_curves(dump, error_curves(dump), budgets, rule)
+    for found, expected in zip(allocate_bands(lambda: iter(bands), budgets, rule), whole, strict=True):
         assert np.array_equal(found.k, expected.k)
         assert found.error == pytest.approx(expected.error, rel=1e-12)
-        assert (found.k_min, found.exact, found.used) == (expected.k_min, expected.exact, expected.used)
+        assert (found.exact, found.used) == (expected.exact, expected.used)
         assert found.bound == (None if rule != "optimal" else pytest.approx(expected.bound, rel=1e-9))
 
 
 def test_row_bands_refuse_what_they_cannot_do() -> None:
     for budgets, rule in (([5], "fixed"), ([2.5], "optimal"), ([-1], "greedy")):
         with pytest.raises(Problem):
-            allocate_bands(lambda: bands_of(random_dump(4, 4, 3, seed=0), 2), budgets, rule)  # type: ignore[arg-type]
+            allocate_bands(lambda: bands_of(random_dump(4, 4, 3, seed=0), 8), budgets, rule)  # type: ignore[arg-type]
 
 
 @settings(max_examples=60, deadline=None)

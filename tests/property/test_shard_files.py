@@ -46,7 +46,7 @@ def tables(draw: st.DrawFn) -> tuple[Columns, list[tuple[list[int], list[float]]
     for _ in range(draw(st.integers(0, 12))):
         lengths = draw(st.lists(st.integers(1, 16_000), max_size=4))
         errors = sorted(draw(st.sets(st.floats(0.0, 3.0, width=32, exclude_min=True), min_size=4, max_size=4)))
-        ks = [1 + sum(lengths[:i]) for i in range(len(lengths) + 1)] if lengths else []
+        ks = [sum(lengths[:i]) for i in range(len(lengths) + 1)] if lengths else []
         hulls.append((ks, [*errors[::-1][4 - len(lengths) :], 0.0] if lengths else []))
     rows = len(hulls)
     finite = st.floats(allow_nan=False, allow_infinity=False, width=32)

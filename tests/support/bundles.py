@@ -17,6 +17,7 @@ from schemas.bundle import (
     file_spec,
     layer_specs,
 )
+from schemas.tail import DEFAULT_TAIL
 
 TOLERANCE = 1e-4
 
@@ -41,15 +42,16 @@ def make_bundle(
         features=(FeatureSpec(name="count", mean=0.0, std=1.0),),
         hidden=(4,),
         layers=layer_specs(1, (4,)),
-        tail=TailSpec(name="density", g=0.75),
+        tail=TailSpec(name=DEFAULT_TAIL, g=0.75),
         metric="display",
-        k_min=1,
         files={name: file_spec(folder / name) for name in FILES},
         onnx=OnnxSpec(opset=17, ir_version=8),
         self_test=SelfTest(
             features=(), outputs=(), sums=(), derived=(), tolerance={}, feature_tolerance=1e-4, output_scale=(1.0, 1.0)
         ),
-        parity=ParityReport(count=10, tolerance=TOLERANCE, torch_onnx=1e-7, torch_glsl=parity, driver="llvmpipe"),
+        parity=ParityReport(
+            count=10, tolerance=TOLERANCE, torch_onnx=1e-7, torch_glsl=parity, torch_ubo=0.0, driver="llvmpipe"
+        ),
         provenance=Provenance(scenes=scenes or {"bottles": "0" * 64}, code_version="v1", seed=0, machine="a machine"),
         evaluation={"views": 2},
     )

@@ -3,7 +3,8 @@
  *     check FOLDER...                 a line for each: "ok", name and self-test, or what is wrong
  *     predict FOLDER IN OUT           rows of features -> rows of answers
  *     features FOLDER IN OUT          rows of raw sums -> rows of features
- *     solve PIXELS BUDGET IN OUT      a, b (float), n (uint32), [PIXELS] each -> k; prints the solution
+ *     cuts PIXELS BINS BUDGET IN OUT  a, b (float [PIXELS]), counts (uint8 [PIXELS][BINS]) -> cuts, k; prints the solution
+ *     importances IN OUT              rows of an importance -> rows of a and b
  *     fuzz FOLDER SEED COUNT          damages the manifest and the weights in memory; prints how many were accepted
  */
 #define DIAPHANE_BUNDLE_IMPLEMENTATION
@@ -65,25 +66,36 @@ static void convert(int predicts, char **argv) {
     diaphane_free(&bundle);
 }
 
-static void solve(char **argv) {
-    size_t pixels = (size_t)strtoul(argv[0], NULL, 10), size;
-    unsigned char *bytes = whole(argv[2], &size);
+static void cuts(char **argv) {
+    size_t pixels = (size_t)strtoul(argv[0], NULL, 10), bins = (size_t)strtoul(argv[1], NULL, 10), size;
+    unsigned char *bytes = whole(argv[3], &size);
     float *numbers = (float *)allocated(2 * pixels * sizeof *numbers);
-    uint32_t *n = (uint32_t *)allocated(pixels * sizeof *n), *k = (uint32_t *)allocated(pixels * sizeof *k);
-    DiaphaneSolution found;
+    uint8_t *counts = (uint8_t *)allocated(pixels * bins); /* of exactly this size, for the sanitizer */
+    uint32_t *found = (uint32_t *)allocated(2 * pixels * sizeof *found);
+    DiaphaneSolution solution;
     memcpy(numbers, bytes, 8 * pixels);
-    memcpy(n, bytes + 8 * pixels, 4 * pixels);
-    if (!diaphane_solve(numbers, numbers + pixels, n, pixels, strtoull(argv[1], NULL, 10), k, &found, &error)) {
-        printf("%s\n", error.text);
+    memcpy(counts, bytes + 8 * pixels, pixels * bins);
+    if (!diaphane_cuts(numbers, numbers + pixels, counts, (int)bins, pixels, strtoull(argv[2], NULL, 10), found,
+                       found + pixels, &solution)) {
+        printf("refused\n");
     } else {
-        printf("%d %d %d %.9g %llu\n", found.k_min, found.complete, found.index, (double)found.log_lambda,
-               (unsigned long long)found.total);
-        save(argv[3], k, pixels * sizeof *k);
+        printf("%d %d %llu\n", solution.complete, solution.rank, (unsigned long long)solution.total);
+        save(argv[4], found, 2 * pixels * sizeof *found);
     }
     free(bytes);
     free(numbers);
-    free(n);
-    free(k);
+    free(counts);
+    free(found);
+}
+
+static void importances(char **argv) {
+    size_t size, i;
+    float *input = (float *)(void *)whole(argv[0], &size);
+    float *curves = (float *)allocated(2 * size);
+    for (i = 0; i < size / sizeof *input; ++i) diaphane_importance_curve(input[i], &curves[2 * i], &curves[2 * i + 1]);
+    save(argv[1], curves, 2 * size);
+    free(input);
+    free(curves);
 }
 
 static uint64_t state;
@@ -163,7 +175,8 @@ int main(int argc, char **argv) {
         for (i = 2; i < argc; ++i) check(argv[i]);
     else if (argc == 5 && !strcmp(argv[1], "predict")) convert(1, argv + 2);
     else if (argc == 5 && !strcmp(argv[1], "features")) convert(0, argv + 2);
-    else if (argc == 6 && !strcmp(argv[1], "solve")) solve(argv + 2);
+    else if (argc == 7 && !strcmp(argv[1], "cuts")) cuts(argv + 2);
+    else if (argc == 4 && !strcmp(argv[1], "importances")) importances(argv + 2);
     else if (argc == 5 && !strcmp(argv[1], "fuzz")) fuzz(argv + 2);
     else return stop("what?");
     return 0;

@@ -117,7 +117,7 @@ class TableRunner:
                 "errors": {"optimal": [1.0] * count, "greedy": [1.5] * count},
                 "certificates": [certificate] * count,
                 "shard": {"sha256": "0" * 64, "bytes": 10},
-                "skips": {"pixels already exact at k_min": 3, "budgets given more than once": 0},
+                "skips": {"pixels exact at k = 0": 3, "budgets given more than once": 0},
             }
         if task.stage == "train":
             return {"history": [{"step": 1, "loss": 1.0, "over_optimum": 2.0}], "config": {}}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from labeller.curves import error_curves
+from labeller.curves import error_curves, whole_bins
 from labeller.dataset_index import DatasetIndex, Member, SourceView, Split, write_index
 from labeller.hull import lower_hulls
 from labeller.sampling import SamplingKind
@@ -28,8 +28,8 @@ def random_shard(
 ) -> Written:
     """A shard of a random dump, in blocks small enough for several of them."""
     dump = random_dump(side, side, max_n, seed)
-    curves = error_curves(dump)
-    write_shard(path, dump, curves, lower_hulls(curves, 1), [dump.pixels, 2 * dump.pixels], fraction, kind=kind)
+    curves = whole_bins(dump, error_curves(dump))
+    write_shard(path, dump, curves, lower_hulls(curves), [dump.pixels, 2 * dump.pixels], fraction, kind=kind)
     with open_columns(path) as file:
         columns, view = file.read(0, file.layout.rows), file.layout.view
     return write_columns(path, columns, view, block_rows)

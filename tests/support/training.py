@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -10,35 +11,35 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from labeller.curves import error_curves
+from labeller.curves import error_curves, whole_bins
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
 from renderer.features import FEATURES, derive, gather
-from schemas.bundle import HeadName, OutputName, Provenance, TailSpec
-from schemas.tail import TailName
+from schemas.bundle import GLSL, MANIFEST, HeadName, OutputName, Provenance, TailSpec, file_spec, load_manifest
+from schemas.tail import DEFAULT_TAIL, TailName
 from support.dumps import random_dump
 from trainer.bundle import Description, export_bundle
 from trainer.dataset import ViewData, make_view
+from trainer.export_shader import shader_source
 from trainer.paper import with_paper_inputs
 from trainer.weights import Layer, Weights
 
 
 def random_view(asset: str, seed: int, size: int = 40, max_n: int = 12) -> ViewData:
-    """Every pixel of a random dump with more than one fragment; scored at 1/4 and 1/2 of its fragments."""
+    """Every pixel of a random dump with fragments; scored at 1/4 and 1/2 of its fragments."""
     dump = random_dump(size, size, max_n, seed)
-    curves = error_curves(dump)
-    hulls = lower_hulls(curves, 1)
+    curves = whole_bins(dump, error_curves(dump))
+    hulls = lower_hulls(curves)
     budgets = [dump.total // 4, dump.total // 2]
     prices = [math.log(found.lam or 1e-9) for found in allocate_curves(dump, curves, budgets, "optimal", hulls)]
-    rows = np.flatnonzero(dump.counts > 1)
+    rows = np.flatnonzero(dump.counts)
     sizes = np.diff(hulls.offsets)[rows]
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     vertices = np.arange(offsets[-1]) + np.repeat(hulls.offsets[rows] - offsets[:-1], sizes)
     return make_view(
         asset,
-        features=derive(gather(dump))[rows],
+        features=derive(gather(dump, DEFAULT_TAIL))[rows],
         n=dump.counts[rows].astype(np.int32),
-        k_min=1,
         hull=(offsets, hulls.k[vertices], hulls.error[vertices]),
         price_range=(min(prices) - 1.0, max(prices) + 1.0),
         anchors=prices,
@@ -49,7 +50,7 @@ def random_view(asset: str, seed: int, size: int = 40, max_n: int = 12) -> ViewD
 def random_paper_view(asset: str, seed: int, size: int = 40, max_n: int = 12) -> ViewData:
     """`random_view` with what DHOIT's network reads."""
     dump = random_dump(size, size, max_n, seed)
-    pixel = np.flatnonzero(dump.counts > 1)
+    pixel = np.flatnonzero(dump.counts)
     return with_paper_inputs(random_view(asset, seed, size, max_n), dump, pixel, [dump.total // 4, dump.total // 2])
 
 
@@ -78,22 +79,33 @@ def random_weights(
 
 
 def export_random(
-    folder: Path, network: Weights, features: NDArray[np.float32], gl: moderngl.Context, tail: TailName = "density"
+    folder: Path, network: Weights, features: NDArray[np.float32], gl: moderngl.Context, tail: TailName = DEFAULT_TAIL
 ) -> None:
     """A bundle of a network in a folder, its forms compared on these features."""
     description = Description(
         name="random",
         tail=TailSpec(name=tail, g=0.75),
         metric="display",
-        k_min=1,
         provenance=Provenance(scenes={}, code_version="0", seed=0, machine="test"),
         evaluation={},
     )
     export_bundle(folder, network, description, features, gl)
 
 
+def export_overflowing(folder: Path, network: Weights, features: NDArray[np.float32], gl: moderngl.Context) -> None:
+    """A bundle of a network whose shader has sums that overflow: it answers infinity of either sign, and NaN."""
+    export_random(folder, network, features, gl)
+    manifest = load_manifest(folder)
+    weight, bias = network.layers[-1]
+    largest = np.copysign(np.float32(3e38), weight)
+    overflowed = replace(network, layers=(*network.layers[:-1], (largest, bias)))
+    (folder / GLSL).write_text(shader_source(overflowed), encoding="utf-8")
+    manifest = manifest.model_copy(update={"files": {**manifest.files, GLSL: file_spec(folder / GLSL)}})
+    (folder / MANIFEST).write_text(manifest.model_dump_json(), encoding="utf-8")
+
+
 def real_features(rows: int, seed: int) -> np.ndarray[tuple[int, ...], np.dtype[np.float32]]:
-    """float32 [rows, 26], features of the pixels of a random dump that have fragments."""
+    """float32 [rows, features], features of the pixels of a random dump that have fragments."""
     side = math.ceil(math.sqrt(1.2 * rows)) + 1
     dump = random_dump(side, side, 10, seed)
-    return derive(gather(dump))[dump.counts > 0][:rows]
+    return derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0][:rows]

@@ -9,22 +9,20 @@
 
 static int spend(const DiaphaneBundle *bundle) {
     enum { PIXELS = 4 };
-    uint32_t n[PIXELS] = {0, 1, 6, 12}, k[PIXELS];
+    uint8_t counts[PIXELS * DIAPHANE_MOST_BINS] = {0}; /* fragments in each bin: a renderer gathers them */
+    uint32_t cut[PIXELS], k[PIXELS];
     float a[PIXELS] = {0}, b[PIXELS] = {0}, y[DIAPHANE_MAX_OUTPUTS], x[DIAPHANE_FEATURES];
     DiaphaneSolution found;
-    DiaphaneError error;
-    for (int p = 2; p < PIXELS; ++p) { /* a renderer has sums of its own: diaphane_features */
+    for (int p = 1; p < PIXELS; ++p) { /* a renderer has sums of its own: diaphane_features */
         for (int i = 0; i < bundle->features; ++i)
             x[i] = (float)bundle->test_features[(size_t)p * (size_t)bundle->features + (size_t)i];
         if (!diaphane_predict(bundle, x, y)) return 0;
         a[p] = y[0];
         b[p] = y[1];
+        for (int bin = 0; bin < bundle->bins; bin += 3) counts[p * bundle->bins + bin] = (uint8_t)p;
     }
-    if (!diaphane_solve(a, b, n, PIXELS, 9, k, &found, &error)) {
-        fprintf(stderr, "%s\n", error.text);
-        return 0;
-    }
-    printf("budget 9: slots %u %u %u %u, log lambda %.6g\n", k[0], k[1], k[2], k[3], (double)found.log_lambda);
+    if (!diaphane_cuts(a, b, counts, bundle->bins, PIXELS, 9, cut, k, &found)) return 0;
+    printf("budget 9: bins %u %u %u %u, fragments %u %u %u %u\n", cut[0], cut[1], cut[2], cut[3], k[0], k[1], k[2], k[3]);
     return 1;
 }
 
@@ -41,7 +39,8 @@ int main(int argc, char **argv) {
         fprintf(stderr, "%s\n", error.text);
         return 1;
     }
-    printf("%s: tail %s, metric %s, %d files\n", bundle.name, bundle.tail, bundle.metric, bundle.files);
+    printf("%s: tail %s of %d bins, metric %s, %d files\n", bundle.name, bundle.tail, bundle.bins, bundle.metric,
+           bundle.files);
     printf("reads:");
     for (int i = 0; i < bundle.features; ++i) {
         const char *name = diaphane_feature_name(bundle.feature[i]);

@@ -3,7 +3,7 @@
 layout(early_fragment_tests) in;
 #include "common/surface.glsl"
 
-layout(std430, binding = 0) buffer Used { uint used[]; };
+layout(std430, binding = 0) buffer Used { uint used[]; };  // of the window
 layout(std430, binding = 1) writeonly buffer Slots { uvec2 slot[]; };  // packed colour, depth bits
 uniform int width;
 uniform int first_row;
@@ -14,6 +14,6 @@ void main() {
 #if MIXED
     if (!is_transparent(stored)) return;
 #endif
-    int p = (int(gl_FragCoord.y) - first_row) * width + int(gl_FragCoord.x);
-    slot[uint(p) * uint(slots) + atomicAdd(used[p], 1u)] = uvec2(pack(stored), floatBitsToUint(v_depth));
+    int p = int(gl_FragCoord.y) * width + int(gl_FragCoord.x);
+    slot[uint(p - first_row * width) * uint(slots) + atomicAdd(used[p], 1u)] = uvec2(pack(stored), floatBitsToUint(v_depth));
 }

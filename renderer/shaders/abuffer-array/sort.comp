@@ -1,13 +1,12 @@
 #version 450
-// Sorts the arrays of listed pixels in place, by heapsort. A dispatch makes the heaps, or takes some fragments from
+// Sorts the arrays of a band's pixels in place, by heapsort. A dispatch makes the heaps, or takes some fragments from
 // each, since drivers limit the turns of a shader's loops.
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 0) readonly buffer Used { uint used[]; };
+layout(std430, binding = 0) readonly buffer Used { uint used[]; };  // of the window
 layout(std430, binding = 1) buffer Slots { uvec2 slot[]; };  // packed colour, depth bits
-layout(std430, binding = 2) readonly buffer Pixels { uint pixel[]; };  // of this band
-uniform int pixels;
-uniform int first;
+uniform uint pixels;      // of this band
+uniform uint first_pixel; // of it
 uniform int slots;
 uniform bool make;       // heaps, instead of taking from them
 uniform int first_taken; // the farthest is taken first
@@ -34,9 +33,9 @@ void sift(uvec2 fragment, uint base, uint root, uint n) {
 }
 
 void main() {
-    int i = int(gl_GlobalInvocationID.x) + first;
-    if (i >= pixels) return;
-    uint p = pixel[i], base = p * uint(slots), n = used[p];
+    uint p = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * 64u;
+    if (p >= pixels) return;
+    uint base = p * uint(slots), n = used[first_pixel + p];
     if (make) {
         // All pixels go through the same roots, so that those of a group are busy with heaps of about one height.
         for (uint root = uint(slots) / 2u; root > 0u; --root) {

@@ -1,15 +1,13 @@
 #version 450
-// Sorts the lists of listed pixels by merging runs of 1, 2, 4, ... nodes: only links change, so any number of fragments
+// Sorts the lists of a band's pixels by merging runs of 1, 2, 4, ... nodes: only links change, so any number of fragments
 // needs no memory of its own. A dispatch does a few levels, since drivers limit the turns of a shader's loops.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) buffer Heads { uint head[]; };
 layout(std430, binding = 1) buffer Nodes { uint node[]; };  // packed colour, depth bits, next
-layout(std430, binding = 2) readonly buffer Pixels { uint pixel[]; };  // of this band
 layout(std430, binding = 3) readonly buffer Counts { uint count[]; };  // of the window
-uniform int pixels;
-uniform int first;
-uniform int first_pixel;  // of this band
+uniform uint pixels;  // of this band
+uniform int first_pixel;  // of it
 uniform int first_run;
 uniform int last_run;
 
@@ -45,9 +43,9 @@ uint merged(uint list, uint run) {
 }
 
 void main() {
-    int i = int(gl_GlobalInvocationID.x) + first;
-    if (i >= pixels) return;
-    uint p = pixel[i], n = count[uint(first_pixel) + p], list = head[p];
+    uint p = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * 64u;
+    if (p >= pixels) return;
+    uint n = count[uint(first_pixel) + p], list = head[p];
     for (uint run = uint(first_run); run < n && run <= uint(last_run); run *= 2u) list = merged(list, run);
     head[p] = list;
 }

@@ -72,14 +72,15 @@ void main() {
         trans[i] = 1.0;
     }
     for (uint j = found.x; j < found.y; ++j) {
-        uint word = colour[j];
-        insert(uvec3(depth[j], word, j), float(255u - (word >> 24)) * LEVEL);
+        Fragment next = fragment_at(j);
+        insert(uvec3(next.depth, next.colour, j), float(255u - (next.colour >> 24)) * LEVEL);
         if (key[NODES].x != EMPTY) remove_least();
     }
     vec4 light = vec4(0.0, 0.0, 0.0, trans[NODES - 1]);
     for (uint j = found.x; j < found.y; ++j) {
-        uint word = colour[j];
-        light.rgb += visibility(uvec3(depth[j], word, j)) * opacity_of(word) * decoded(word);
+        Fragment next = fragment_at(j);
+        float visible = visibility(uvec3(next.depth, next.colour, j));
+        light.rgb += visible * opacity_of(next.colour) * decoded(next.colour);
     }
     out_colour = over_background(light);
 }

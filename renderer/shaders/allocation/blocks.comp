@@ -1,11 +1,12 @@
 #version 450
-// Slots of every block, and by how many it grows at the next price.
+// Fragments of every block of pixels: granted, and what they grow by at the chosen rank.
 layout(local_size_x = 256) in;
 #include "allocation/state.glsl"
-#include "allocation/curve.glsl"
-#include "allocation/slots.glsl"
+#include "allocation/bins.glsl"
+#include "allocation/rank.glsl"
+#include "allocation/cut.glsl"
 
-layout(std430, binding = 4) writeonly buffer Blocks { uvec2 sums[]; };  // [blocks]
+layout(std430, binding = 3) writeonly buffer Blocks { uvec2 sums[]; };  // [blocks]
 shared uint sure, growth;
 
 void main() {
@@ -13,7 +14,10 @@ void main() {
     if (lane == 0u) sure = growth = 0u;
     barrier();
     uvec2 own = uvec2(0u);
-    for (uint i = 0u; i < BLOCK / 256u; ++i) own += slots_of(block * BLOCK + i * 256u + lane);
+    for (uint i = 0u; i < uint(BLOCK) / 256u; ++i) {
+        Cut cut = cut_of(block * uint(BLOCK) + i * 256u + lane);
+        own += uvec2(cut.fragments, cut.more_fragments - cut.fragments);
+    }
     atomicAdd(sure, own.x);
     atomicAdd(growth, own.y);
     barrier();

@@ -1,40 +1,37 @@
 #version 450
-// Which bin holds the budget; where the next round counts. One work group.
-layout(local_size_x = 512) in;
+// Which half of a rank the budget ends in. STEP 0: whether there is anything to choose; 1: the first half; 2: the second.
+layout(local_size_x = 256) in;
 #include "allocation/state.glsl"
 
-layout(std430, binding = 4) readonly buffer Blocks { uint sums[]; };  // [blocks, EDGES]
-const uint SLICES = 512u / EDGES;
-shared uint part[512];
-shared int found_low, found_high;
+const uint SIZE = 1u << HALF_BITS;
+const uint OWN = SIZE / 256u;
+shared uint part[256];
 
 void main() {
     uint lane = gl_LocalInvocationIndex;
-    uint rows = count_groups[0];
-    if (rows == 0u) return;  // it is found
+#if STEP
+    if (complete == 1u) return;
     uint own = 0u;
-    for (uint row = lane / EDGES; row < rows; row += SLICES) own = add(own, sums[row * EDGES + lane % EDGES]);
+    for (uint i = 0u; i < OWN; ++i) own += counted[lane * OWN + i];
     part[lane] = own;
     barrier();
-    if (lane == 0u) {
-        found_low = low;
-        found_high = high;
-        for (uint j = 0u; j < EDGES; ++j) {
-            uint sum = 0u;
-            for (uint slice = 0u; slice < SLICES; ++slice) sum = add(sum, part[slice * EDGES + j]);
-            if (sum > left) {
-                found_high = edge[j];
-                break;
-            }
-            found_low = edge[j];
-            low_sum = sum;
-        }
-        low = found_low;
-        high = found_high;
-        warm = 1u;
-        ++rounds;
-        if (found_high - found_low <= 1) count_groups[0] = 0u;
+    uint before = spent;
+    barrier();
+    for (uint i = 0u; i < lane; ++i) before += part[i];
+    // Exactly one thread's run has the first number with which it is too much.
+    if (before <= budget && before + own > budget) {
+        uint i = lane * OWN;
+        for (; before + counted[i] <= budget; ++i) before += counted[i];
+        spent = before;
+#if STEP == 1
+        high = i;
+#else
+        rank = high << uint(HALF_BITS) | i;
+#endif
     }
     barrier();
-    if (lane < EDGES) edge[lane] = edge_between(found_low, found_high, int(lane));
+#else
+    if (lane == 0u) complete = uint(fragments <= budget);
+#endif
+    for (uint i = 0u; i < OWN; ++i) counted[lane * OWN + i] = 0u;
 }

@@ -1,38 +1,46 @@
 #version 450
-// Fragments of the open pixels at every edge: the bins of a round, in shared memory.
-layout(local_size_x = 128) in;
+// Fragments by one half of the rank of the price that they come at; with LOW the second half, of those whose first is
+// the one that was chosen.
+layout(local_size_x = 256) in;
 #include "allocation/state.glsl"
-#include "allocation/curve.glsl"
+#include "allocation/bins.glsl"
+#include "allocation/rank.glsl"
 
-layout(std430, binding = 1) readonly buffer Counts { uint n[]; };
-layout(std430, binding = 2) readonly buffer List { uint pixel[]; };
-layout(std430, binding = 3) readonly buffer Curves { vec2 curve[]; };  // a and 1 / b
-layout(std430, binding = 4) writeonly buffer Blocks { uint sums[]; };  // [blocks, EDGES]
-const uint OWN = BLOCK / 128u;
-shared float at[EDGES];
-shared uint bin[EDGES];
+layout(std430, binding = 2) readonly buffer Curves { vec2 curve[]; };  // [P], a and b
+uniform uint pixels;
+const uint SIZE = 1u << HALF_BITS;
+shared uint own_counted[SIZE];
+
+void add_events(uint p) {
+    PixelBins bins = bins_of(p);
+    vec2 gain = curve[p];
+    uint before = 0u;
+    bool is_open = true;
+    for (int bin = 0; bin < BINS; ++bin) {
+        uint own = count_in(bins, bin);
+        is_open = is_open && fits(own, before);
+        if (is_open && own > 0u) {
+            uint found = rank_of(gain, before, before + own);
+#if LOW
+            if (found >> uint(HALF_BITS) == high) atomicAdd(own_counted[found & (SIZE - 1u)], own);
+#else
+            atomicAdd(own_counted[found >> uint(HALF_BITS)], own);
+#endif
+        }
+        before += own;
+    }
+}
 
 void main() {
+    if (complete == 1u) return;
     uint lane = gl_LocalInvocationIndex;
-    if (lane < EDGES) {
-        at[lane] = price(edge[lane]);
-        bin[lane] = 0u;
-    }
-    vec4 own[OWN];  // a, 1 / b, least, most; beyond the list there are none at any price
-    for (uint i = 0u; i < OWN; ++i) {
-        uint place = gl_WorkGroupID.x * BLOCK + i * 128u + lane;
-        bool is_open = place < open_pixels;
-        uint p = is_open ? pixel[place] : 0u;
-        own[i] = is_open ? vec4(curve[p], float(k_min), float(usable(n[p]))) : vec4(0.0);
+    for (uint i = lane; i < SIZE; i += 256u) own_counted[i] = 0u;
+    barrier();
+    for (uint i = 0u; i < uint(BLOCK) / 256u; ++i) {
+        uint p = gl_WorkGroupID.x * uint(BLOCK) + i * 256u + lane;
+        if (p < pixels) add_events(p);
     }
     barrier();
-    for (uint j = 0u; j < EDGES; ++j) {
-        uint here = (j + lane) % EDGES;  // neighbours add to different bins
-        float t = at[here];
-        uint sum = 0u;
-        for (uint i = 0u; i < OWN; ++i) sum += fragments_at(t, own[i].x, own[i].y, own[i].z, own[i].w);
-        atomicAdd(bin[here], sum);
-    }
-    barrier();
-    if (lane < EDGES) sums[gl_WorkGroupID.x * EDGES + lane] = bin[lane];
+    for (uint i = lane; i < SIZE; i += 256u)
+        if (own_counted[i] > 0u) atomicAdd(counted[i], own_counted[i]);
 }

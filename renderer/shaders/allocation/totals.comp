@@ -1,30 +1,36 @@
 #version 450
-// Fragments, occupied pixels and pixels of one fragment of every block.
+// Fragments that can be in a core, and occupied pixels.
 layout(local_size_x = 256) in;
 #include "allocation/state.glsl"
+#include "allocation/bins.glsl"
 
-layout(std430, binding = 1) readonly buffer Counts { uint n[]; };
-layout(std430, binding = 4) writeonly buffer Blocks { uint sums[]; };  // [blocks, EDGES], three are used
 uniform uint pixels;
-shared uint fragments, filled, singles;
+shared uint found, filled;
 
 void main() {
-    uint lane = gl_LocalInvocationIndex, block = gl_WorkGroupID.x;
-    if (lane == 0u) fragments = filled = singles = 0u;
+    uint lane = gl_LocalInvocationIndex;
+    if (lane == 0u) found = filled = 0u;
     barrier();
-    uvec3 own = uvec3(0u);
-    for (uint i = 0u; i < BLOCK / 256u; ++i) {
-        uint p = block * BLOCK + i * 256u + lane;
-        uint count = p < pixels ? usable(n[p]) : 0u;
-        own += uvec3(count, min(count, 1u), uint(count == 1u));
+    uint sum = 0u, some = 0u;
+    for (uint i = 0u; i < uint(BLOCK) / 256u; ++i) {
+        uint p = gl_WorkGroupID.x * uint(BLOCK) + i * 256u + lane;
+        if (p >= pixels) continue;
+        PixelBins bins = bins_of(p);
+        some += uint(known_fragments(bins) > 0u);
+        uint before = 0u;
+        bool is_open = true;
+        for (int bin = 0; bin < BINS; ++bin) {
+            uint own = count_in(bins, bin);
+            is_open = is_open && fits(own, before);
+            before += is_open ? own : 0u;
+        }
+        sum += before;
     }
-    atomicAdd(fragments, own.x);
-    atomicAdd(filled, own.y);
-    atomicAdd(singles, own.z);
+    atomicAdd(found, sum);
+    atomicAdd(filled, some);
     barrier();
     if (lane == 0u) {
-        sums[block * EDGES] = fragments;
-        sums[block * EDGES + 1u] = filled;
-        sums[block * EDGES + 2u] = singles;
+        atomicAdd(fragments, found);
+        atomicAdd(occupied, filled);
     }
 }

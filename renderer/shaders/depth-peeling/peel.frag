@@ -4,7 +4,6 @@ layout(early_fragment_tests) in;
 #include "common/surface.glsl"
 #include "depth-peeling/side.glsl"
 
-layout(std430, binding = 0) buffer Sides { Side side[]; };
 uniform int width;
 uniform int first_row;
 
@@ -22,6 +21,6 @@ void main() {
         atomicMin(side[p].next_depth, z);
     } else if (word > side[p].taken) {
         atomicMin(side[p].next_colour, word);
-        atomicAdd(side[p].remaining, 1u);
+        atomicAdd(count[p], 1u);
     }
 }

@@ -4,14 +4,13 @@ layout(early_fragment_tests) in;
 #include "common/surface.glsl"
 #include "depth-peeling/side.glsl"
 
-layout(std430, binding = 0) buffer Sides { Side side[]; };  // front and back of each pixel
 uniform int width;
 uniform int first_row;
 
 void collect(int at, uint colour) {
     if (colour <= side[at].taken) return;
     atomicMin(side[at].next_colour, colour);
-    atomicAdd(side[at].remaining, 1u);
+    atomicAdd(count[at], 1u);
 }
 
 void main() {

@@ -1,34 +1,38 @@
 #version 450
-// The bundle's network on the gathered sums of every open pixel, for the allocation within the frame: a and 1 / b of
-// log gain(k) = a - b (k-1). Pixels whose k their count alone settles have none; 1 / b is stored so that every later pass
-// has the same number. With OUTPUTS 1 the network answers an importance w, whose curve is k = floor(t w) at the price t
-// (renderer/allocation/lattice.py: importance_curves).
+// The bundle's network on every occupied pixel, for the allocation within the frame: a and b of
+// log gain(k) = a - b (k-1). With OUTPUTS 1 it answers an importance w (renderer/allocation/cuts.py: importance_curve).
 layout(local_size_x = 64) in;
 #include "allocation/state.glsl"
+#include "allocation/bins.glsl"
 #include "kbuffer-deep/inputs.glsl"
 
-layout(std430, binding = 5) writeonly buffer Curves { vec2 curve[]; };  // [P], a and 1 / b
+layout(std430, binding = 2) writeonly buffer Curves { vec2 curve[]; };  // [P], a and b
 
 uniform uint pixels;
 
-// `clamp`, and the least for NaN, which a network that overflows can answer: clamp(NaN) may be anything, and where a curve
-// is NaN no price uses the budget. The bits are asked because a compiler may take it that a comparison never meets NaN.
-float within(float x, float least, float most) {
+// `clamp`, and the given number for NaN, which a network that overflows can answer: clamp(NaN) may be anything. The bits
+// are asked because a compiler may take it that a comparison never meets NaN.
+float within(float x, float least, float most, float for_nan) {
     bool is_nan = (floatBitsToUint(x) & 0x7FFFFFFFu) > 0x7F800000u;
-    return is_nan ? least : clamp(x, least, most);
+    return is_nan ? for_nan : clamp(x, least, most);
 }
 
 void main() {
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     uint p = 64u * group + gl_LocalInvocationIndex;
-    if (p >= pixels || complete == 1u || count[p] <= k_min) return;
+    if (p >= pixels || complete == 1u) return;
+    uint fragments = known_fragments(bins_of(p));
+    if (fragments == 0u) return;
     float x[DIAPHANE_FEATURES];
-    read_features(int(p), x);
+    read_features(int(p), fragments, x);
 #if OUTPUTS == 1
-    float w = within(diaphane_predict(x), LEAST_RATE, MOST_RATE);
-    curve[p] = vec2(-1.5 / w, w);
+    precise float fall = 1.0 / within(diaphane_predict(x), 1.0 / float(MOST_FALL), 1.0, 1.0 / float(MOST_FALL));
+    curve[p] = vec2(max(-1.5 * fall, -float(MOST_GAIN)), fall);
 #else
     vec2 gain = diaphane_predict(x).xy;
-    curve[p] = vec2(within(gain.x, -MOST_GAIN, MOST_GAIN), within(1.0 / gain.y, LEAST_RATE, MOST_RATE));
+    curve[p] = vec2(
+        within(gain.x, -float(MOST_GAIN), float(MOST_GAIN), -float(MOST_GAIN)),
+        within(gain.y, float(LEAST_FALL), float(MOST_FALL), float(MOST_FALL))
+    );
 #endif
 }

@@ -1,7 +1,8 @@
 #version 450
-// The bundle's network on the gathered sums, for listed pixels, to be read back: its outputs in their order.
-// With FEATURES_ONLY it writes what the network reads instead, for a runtime on the CPU.
+// The bundle's network for listed pixels, to be read back: its outputs in their order. With FEATURES_ONLY what it reads
+// instead, for a runtime on the CPU.
 layout(local_size_x = 64) in;
+#include "allocation/bins.glsl"
 #include "kbuffer-deep/inputs.glsl"
 
 layout(std430, binding = 0) readonly buffer Pixels { uint pixel[]; };
@@ -17,7 +18,7 @@ void main() {
     int i = int(gl_GlobalInvocationID.x) + first;
     if (i >= pixels) return;
     float x[DIAPHANE_FEATURES];
-    read_features(int(pixel[i]), x);
+    read_features(int(pixel[i]), known_fragments(bins_of(pixel[i])), x);
 #if FEATURES_ONLY
     for (int j = 0; j < DIAPHANE_FEATURES; ++j) feature[(i - first) * DIAPHANE_FEATURES + j] = x[j];
 #elif OUTPUTS == 1

@@ -28,7 +28,7 @@ void observe(int p, uint k, uint slot, vec3 seen, vec4 core, vec4 sums, vec4 opa
     float weight = tail_weight(p, a, depth_at(slot));
     sums += vec4(weight * decoded(stored), weight);
     opacity += vec4(-log(1.0 - a), a, 1.0, 0.0);
-    vec3 change = displayed(seen) - displayed(composed(p, core, sums, opacity, behind));
+    vec3 change = displayed(seen) - displayed(composed(core, sums, opacity, behind));
     float gain = dot(change, change);
     float least = exp(float(SEEN_LEAST));  // NaN is not above it either
     float steps = gain > least ? floor(float(SEEN_STEPS) * (log(gain) - float(SEEN_LEAST)) + 0.5) : 0.0;

@@ -6,18 +6,23 @@
 #extension GL_NV_shader_atomic_int64 : require
 layout(early_fragment_tests) in;
 #include "common/surface.glsl"
+uniform int width;
 #if TAIL >= 0
 #include "kbuffer/tail.glsl"
+#else
+void skip_tail() {}
 #endif
 
 layout(std430, binding = 0) readonly buffer Offsets { uint offset[]; };  // [P+1]
 layout(std430, binding = 2) coherent buffer Slots { uint64_t slot[]; };
-uniform int width;
 
 void main() {
     uvec4 stored = stored_surface();
 #if MIXED
-    if (!is_transparent(stored)) discard;
+    if (!is_transparent(stored)) {
+        skip_tail();
+        return;
+    }
 #endif
     if (gl_HelperInvocation) return;  // beyond the window's edge there are no offsets, and loops would go anywhere
     const uint64_t empty = packUint2x32(uvec2(0xFFFFFFFFu));
@@ -29,7 +34,10 @@ void main() {
         // half of it is compared, since a plain read of 64 bits may see halves of two keys.
         if (unpackUint2x32(slot[i]).y < unpackUint2x32(key).y) continue;
         uint64_t before = atomicMin(slot[i], key);
-        if (before == empty) discard;  // it found a free slot: nothing is left for the tail
+        if (before == empty) {  // it found a free slot: nothing is left for the tail
+            skip_tail();
+            return;
+        }
         key = max(key, before);
     }
 #if TAIL >= 0

@@ -1,45 +1,38 @@
 #version 450
 // Core front to back, then the tail, then the background (METHOD 2). Linear RGB out.
-// TAIL: -1 none (the pool holds every fragment), else as in tail.glsl. STRIDE: words of a slot; the first is the colour.
-// OBSERVE: also note what the last core fragment changed (kbuffer-temporal/observe.glsl).
+// TAIL: -1 none (the pool holds every fragment), else a kind of schemas/tail.py. STRIDE: words of a slot; the first is the colour.
+// CURSOR: runs end where a cursor of so many words says. OBSERVE: also note what the last core fragment changed (kbuffer-temporal/observe.glsl).
 #include "common/composite.glsl"
+uniform int width;
 #ifdef OBSERVE
 #include "kbuffer/tail_weight.glsl"
 #include "kbuffer-temporal/memory.glsl"
-#elif TAIL == 4
-#include "common/depth_bins.glsl"
-layout(std430, binding = 5) readonly buffer DepthBins { uint kept[]; };  // [P, WORDS]; the first is D
 #endif
 
-layout(std430, binding = 0) readonly buffer Offsets { uint offset[]; };  // [P+1]
+layout(std430, binding = 0) readonly buffer Offsets { uint offset[]; };  // [P+1]; with CURSOR [P]
+#ifdef CURSOR
+layout(std430, binding = 1) readonly buffer Cursors { uint cursor[]; };  // [P, CURSOR], the second word: where a run ends
+#endif
 layout(std430, binding = 2) readonly buffer Colours { uint colour[]; };
 layout(binding = 0) uniform sampler2D background;
 #if TAIL >= 0
 layout(binding = 1) uniform sampler2D tail_colour;
-#if TAIL != 4
 layout(binding = 2) uniform sampler2D tail_opacity;
 #endif
-#endif
-uniform int width;
 uniform int first_row;  // of the pool
 layout(location = 0) out vec4 out_colour;
 
-// What is seen of a core with its tail's sums over the background. TAIL 4 has no `opacity`: bins have the optical depth.
-vec3 composed(int p, vec4 light, vec4 sums, vec4 opacity, vec3 behind) {
-#if TAIL == 4
-    if (sums.a > 0.0) {  // T_core P is what the whole list lets through, exp(-D)
-        float through = min(exp(-uintBitsToFloat(kept[WORDS * uint(p)])), light.a);
-        return light.rgb + (light.a - through) / sums.a * sums.rgb + through * behind;
-    }
-#elif TAIL >= 0
-    if (opacity.z > 0.0) {
+// What is seen of a core with its tail's sums over the background.
+vec3 composed(vec4 light, vec4 sums, vec4 opacity, vec3 behind) {
+#if TAIL >= 0
+    if (sums.a > 0.0) {
         vec3 average = sums.rgb / sums.a;
-#if TAIL == 0 || TAIL == 1
-        float through = exp(-opacity.x);  // P = prod (1 - a)
-#else
+#if TAIL == TAIL_WEIGHTED_AVERAGE || TAIL == TAIL_PAPER
         float through = pow(max(1.0 - opacity.y / opacity.z, 0.0), opacity.z);  // P = (1 - A/t)^t
+#else
+        float through = exp(-opacity.x);  // P = prod (1 - a)
 #endif
-#if TAIL == 3
+#if TAIL == TAIL_PAPER
         behind = average + through * behind;  // as DHOIT prints it
 #else
         behind = (1.0 - through) * average + through * behind;
@@ -58,8 +51,13 @@ void main() {
     int p = (xy.y - first_row) * width + xy.x;
     vec4 light = vec4(0.0, 0.0, 0.0, 1.0);
     vec4 without_last = light;
+#ifdef CURSOR
+    uint end = cursor[CURSOR * p + 1];
+#else
+    uint end = offset[p + 1];
+#endif
     uint begin = offset[p], i = begin;
-    for (uint end = offset[p + 1]; i < end; ++i) {
+    for (; i < end; ++i) {
         uint word = colour[STRIDE * i];
         if (word == EMPTY) break;  // the pixel has fewer fragments than slots
         without_last = light;
@@ -70,11 +68,9 @@ void main() {
     vec4 sums = vec4(0.0), opacity = vec4(0.0);
 #if TAIL >= 0
     sums = texelFetch(tail_colour, xy, 0);
-#if TAIL != 4
     opacity = texelFetch(tail_opacity, xy, 0);
 #endif
-#endif
-    vec3 seen = composed(p, light, sums, opacity, behind);
+    vec3 seen = composed(light, sums, opacity, behind);
 #ifdef OBSERVE
     if (i > begin) observe(p, i - begin, i - 1u, seen, without_last, sums, opacity, behind);
 #endif

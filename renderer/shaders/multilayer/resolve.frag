@@ -16,10 +16,10 @@ void main() {
     }
     uvec2 found = run();
     for (uint j = found.x; j < found.y; ++j) {
-        uint word = colour[j];
-        float a = opacity_of(word);
-        uvec2 carried_key = uvec2(depth[j], word);
-        vec4 carried = vec4(a * decoded(word), 1.0 - a);
+        Fragment next = fragment_at(j);
+        float a = opacity_of(next.colour);
+        uvec2 carried_key = uvec2(next.depth, next.colour);
+        vec4 carried = vec4(a * decoded(next.colour), 1.0 - a);
         bool placed = false;  // all that is behind it moves, also a layer that is as deep as the next one
         for (int i = 0; i < NODES; ++i) {
             placed = placed || is_nearer(carried_key, key[i]);

@@ -61,7 +61,7 @@ def _label(task: Any, folder: Path, desk: Any) -> dict[str, Any]:
         "errors": {"optimal": [1.0] * count, "greedy": [1.5] * count},
         "certificates": [{"error": 1.0, "bound": 1.0, "gap": 0.0}] * count,
         "shard": {"sha256": hashlib.sha256(content(task.artifact)).hexdigest(), "bytes": DATA_BYTES},
-        "skips": {"pixels already exact at k_min": 3, "budgets given more than once": 0},
+        "skips": {"pixels exact at k = 0": 3, "budgets given more than once": 0},
     }
 
 

@@ -15,7 +15,6 @@ from benchmarks.casting.check import Effort
 from benchmarks.labelling import page as labelling
 from benchmarks.load import page as load
 from benchmarks.outputs import write_figures
-from benchmarks.predicting import page as predicting
 from benchmarks.render import page as render
 
 BENCHMARKS = Path(provenance.__file__).parent
@@ -24,11 +23,9 @@ PAGES: dict[str, tuple[str, Callable[[Any], str]]] = {
     "FORGETTING": ("forgetting", forgetting.page),
     "LABELLER": ("labeller", labelling.page),
     "LOAD": ("service-load", load.page),
-    "PREDICTORS": ("predictors", lambda found: predicting.page(found, "predictors")),
     "RAYCAST": ("raycast", lambda found: raycast.page(found, Effort())),
     "RENDERER": ("renderer", render.page),
     "TEMPORAL": ("temporal", temporal.page),
-    "TRIALS": ("trials", lambda found: predicting.page(found, "trials")),
 }
 
 

@@ -14,6 +14,7 @@ from labeller.baselines import fixed
 from labeller.curves import error_curves
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
+from schemas.tail import TAILS, TailName
 
 COUNTER_EXAMPLE = curves_of([[0.5, 0.05, 0.0], [0.5, 0.06, 0.04, 0.0]])
 
@@ -57,23 +58,42 @@ def test_no_budget_leaves_everything_to_the_tail(rule: RuleName) -> None:
     dump = random_dump(8, 8, 5, seed=1)
     curves = error_curves(dump)
     (found,) = allocate_curves(dump, curves, [0], rule)
-    assert (found.used, found.k_min) == (0, 0)
+    assert found.used == 0
     assert found.error == pytest.approx(float(curves.error[curves.offsets[:-1]].sum()))
 
 
-@pytest.mark.parametrize("rule", ["greedy", "increment", "optimal", "importance", "uniform", "proportional"])
-def test_every_occupied_pixel_keeps_one_fragment_where_the_budget_covers_it(rule: RuleName) -> None:
+@pytest.mark.parametrize("rule", ["increment", "optimal", "importance", "proportional"])
+def test_pixels_may_be_left_to_their_tail_at_any_budget(rule: RuleName) -> None:
     dump = random_dump(8, 8, 5, seed=1)
     occupied = int(np.count_nonzero(dump.counts))
-    below, at = allocate_curves(dump, error_curves(dump), [occupied - 1, occupied], rule)
-    assert (below.k_min, at.k_min) == (0, 1)
+    (found,) = allocate_curves(dump, error_curves(dump), [occupied], rule)
+    assert (found.k[dump.counts > 0] == 0).any()
+
+
+def test_algorithm_1_keeps_one_fragment_of_every_occupied_pixel_where_the_budget_covers_it() -> None:
+    dump = random_dump(8, 8, 5, seed=1)
+    occupied = int(np.count_nonzero(dump.counts))
+    below, at, above = allocate_curves(dump, error_curves(dump), [occupied - 1, occupied, occupied + 9], "greedy")
+    assert (below.k[dump.counts > 0] == 0).any()
     assert np.array_equal(at.k, np.minimum(dump.counts, 1))
+    assert (above.k >= np.minimum(dump.counts, 1)).all()
+
+
+@pytest.mark.parametrize("tail", TAILS)
+def test_one_fragment_is_exact_without_a_core_unless_the_tail_lacks_its_opacity_factor(tail: TailName) -> None:
+    dump = random_dump(40, 40, 1, seed=3)
+    curves = error_curves(dump, tail)
+    alone = curves.error[curves.offsets[:-1][dump.counts == 1]]
+    assert len(alone)
+    assert (alone > 0.0).any() == (tail == "paper")
+    (found,) = allocate_curves(dump, curves, [dump.total // 2], "optimal")
+    assert (found.error > 0.0) == (tail == "paper")
 
 
 @pytest.mark.parametrize("rule", RULES)
 def test_several_budgets_give_what_each_gives_alone(rule: RuleName) -> None:
     dump = random_dump(12, 12, 7, seed=2)
-    curves, hulls = error_curves(dump), lower_hulls(error_curves(dump), 1)
+    curves, hulls = error_curves(dump), lower_hulls(error_curves(dump))
     budgets = [dump.total // 2, 30, dump.total // 3, dump.total + 1]
     together = allocate_curves(dump, curves, budgets, rule, hulls)
     for budget, found in zip(budgets, together, strict=True):
@@ -84,7 +104,7 @@ def test_several_budgets_give_what_each_gives_alone(rule: RuleName) -> None:
 def test_a_budget_beyond_all_gains_is_not_spent() -> None:
     curves = curves_of([[1.0, 0.5, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     (found,) = allocate_curves(dump_for(curves), curves, [5], "optimal")
-    assert found.k.tolist() == [2, 1]
+    assert found.k.tolist() == [2, 0]
     assert (found.error, found.gap, found.lam) == (0.0, 0.0, 0.0)
 
 
@@ -107,13 +127,13 @@ def test_fixed_counts_every_pixel() -> None:
 
 
 def test_hulls_have_their_lower_points_and_no_flat_end() -> None:
-    hulls = lower_hulls(curves_of([[9.0, 7.0, 2.0, 3.0, 0.0, 0.0], [1.0, 0.0, 0.0], [4.0, 0.0]]), k_min=1)
-    assert hulls.offsets.tolist() == [0, 3, 3, 3]
-    assert hulls.k.tolist() == [1, 2, 4]
-    assert hulls.error.tolist() == [7.0, 2.0, 0.0]
+    hulls = lower_hulls(curves_of([[9.0, 7.0, 2.0, 3.0, 0.0, 0.0], [0.0, 0.0, 0.0], [4.0, 0.0], [0.0]]))
+    assert hulls.offsets.tolist() == [0, 3, 3, 5, 5]
+    assert hulls.k.tolist() == [0, 2, 4, 0, 1]
+    assert hulls.error.tolist() == [9.0, 2.0, 0.0, 4.0, 0.0]
     slopes, lengths = hulls.steps()
-    assert slopes.tolist() == [np.inf, 5.0, 1.0]
-    assert lengths.tolist() == [0, 1, 2]
+    assert slopes.tolist() == [np.inf, 3.5, 1.0, np.inf, 4.0]
+    assert lengths.tolist() == [0, 2, 2, 0, 1]
 
 
 def test_the_papers_fill_wastes_budget() -> None:
@@ -134,6 +154,5 @@ def test_a_hundred_budgets_give_what_each_gives_alone() -> None:
         together = allocate_curves(dump, curves, budgets, rule)
         for budget, found in list(zip(budgets, together, strict=True))[::9]:
             assert np.array_equal(found.k, allocate_curves(dump, curves, [budget], rule)[0].k)
-        for k_min in (0, 1):  # the error rises where k_min becomes 1: pixels that need nothing get a fragment
-            errors = [x.error for x in together if x.k_min == k_min]
-            assert rule == "greedy" or all(b <= a * (1 + 1e-12) for a, b in pairwise(errors))
+        errors = [x.error for x in together]
+        assert rule == "greedy" or all(b <= a * (1 + 1e-12) for a, b in pairwise(errors))

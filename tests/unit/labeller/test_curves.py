@@ -6,13 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from support.curves import split
 from support.dumps import dump_of, random_dump
 
-from labeller.curves import composite, error_curves
+from labeller import reference
+from labeller.curves import UNREACHABLE, composite, error_curves, whole_bins
+from labeller.hull import lower_hulls
+from labeller.rules import allocate_curves
 from schemas.colour import decode_gamma2
 from schemas.fragments import FragmentDump
 from schemas.problem import Problem
-from schemas.tail import TAILS, TailName
+from schemas.tail import BINNED_TAILS, TAILS, TailName
 
 
 def with_depth(depth: list[float]) -> FragmentDump:
@@ -95,3 +99,70 @@ def test_lists_that_do_not_fit_are_refused() -> None:
     ):
         with pytest.raises(Problem, match="malformed"):
             composite(broken, np.zeros(1, int))
+
+
+@pytest.mark.parametrize(
+    "tile_range",
+    [
+        np.zeros((3, 2), np.float32),
+        np.zeros((4, 1), np.float32),
+        np.zeros((4, 2), np.float64),
+        np.full((4, 2), np.nan, np.float32),
+        np.array([[1.0, np.inf]] * 4, np.float32),
+    ],
+)
+def test_ranges_that_are_not_a_pair_of_numbers_a_tile_are_refused(tile_range: np.ndarray) -> None:
+    dump = replace(random_dump(12, 9, 4, seed=1), tile_range=tile_range)
+    with pytest.raises(Problem, match="malformed"):
+        error_curves(dump)
+
+
+def cuts_of(dump: FragmentDump, p: int, tail: TailName) -> set[int]:
+    """Every k that is all fragments of a pixel's first bins, from the plain account of its bins."""
+    pixel, row = reference.pixel_of(dump, p), TAILS[tail]
+    if pixel.n == 0:
+        return {0}
+    bins = reference.depth_bins(pixel, -np.log(np.maximum(1.0 - pixel.alpha, 1e-3)), row).bin
+    return {int((bins < cut).sum()) for cut in range(row.bins + 1)}
+
+
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+def test_of_whole_bins_only_cuts_can_be_reached(tail: TailName) -> None:
+    dump = random_dump(9, 7, 30, seed=6)
+    curves = error_curves(dump, tail)
+    cut = whole_bins(dump, curves)
+    others = 0
+    for p, (before, after) in enumerate(zip(split(curves), split(cut), strict=True)):
+        reached = cuts_of(dump, p, tail)
+        assert set(np.flatnonzero(after < UNREACHABLE)) == reached
+        assert all(after[k] == before[k] for k in reached)
+        others += len(after) - len(reached)
+    assert others > 0
+
+
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+def test_hulls_of_whole_bins_have_cuts_for_vertices(tail: TailName) -> None:
+    dump = random_dump(9, 7, 30, seed=7)
+    hulls = lower_hulls(whole_bins(dump, error_curves(dump, tail)))
+    for p in range(dump.pixels):
+        own = slice(hulls.offsets[p], hulls.offsets[p + 1])
+        assert set(hulls.k[own]) <= cuts_of(dump, p, tail)
+        assert (hulls.error[own] < UNREACHABLE).all()
+
+
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+def test_the_optimum_of_whole_bins_is_of_cuts_and_certified(tail: TailName) -> None:
+    dump = random_dump(6, 5, 12, seed=8)
+    curves = whole_bins(dump, error_curves(dump, tail))
+    any_k = error_curves(dump, tail)
+    budgets = [0, 1, dump.pixels // 2, dump.total // 4, dump.total // 2, dump.total - 1]
+    best = [reference.optimum(split(curves), budget) for budget in budgets]
+    found = allocate_curves(dump, curves, budgets, "optimal")
+    for budget, allocation, least in zip(budgets, found, best, strict=True):
+        assert allocation.used <= budget
+        assert all(int(k) in cuts_of(dump, p, tail) for p, k in enumerate(allocation.k))
+        assert allocation.error < UNREACHABLE
+        bound = allocation.error if allocation.bound is None else allocation.bound
+        assert bound <= least * (1.0 + 1e-6) <= allocation.error * (1.0 + 2e-6)
+    free = [x.error for x in allocate_curves(dump, any_k, budgets, "optimal")]
+    assert all(y.error >= x * (1.0 - 1e-6) for x, y in zip(free, found, strict=True))

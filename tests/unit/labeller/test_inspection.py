@@ -64,13 +64,15 @@ def test_long_lists_share_bins_of_powers_of_two(tmp_path: Path) -> None:
     random_shard(tmp_path / "view", max_n=40)
     bins = inspect(tmp_path / "view").n
     edges = [(bin_.low, bin_.high) for bin_ in bins]
-    assert edges == [*((n, n + 1) for n in range(2, 9)), (9, 17), (17, 33), (33, 65)]
+    assert edges == [*((n, n + 1) for n in range(1, 9)), (9, 17), (17, 33), (33, 65)]
 
 
 def test_a_view_in_which_nothing_can_be_gained_has_no_gains(tmp_path: Path) -> None:
     random_shard(tmp_path / "flat", max_n=1)
     found = inspect(tmp_path / "flat")
-    assert (found.n, found.gains, found.log10_lambda) == ((), (), None)
+    assert (found.gains, found.log10_lambda) == ((), None)
+    assert [(bin_.low, bin_.high) for bin_ in found.n] == [(1, 2)]
+    assert found.splits["all"].exact_rows == found.splits["all"].rows
 
 
 def test_shards_are_found_below_a_folder_without_an_index(tmp_path: Path) -> None:

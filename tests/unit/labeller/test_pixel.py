@@ -28,13 +28,12 @@ def test_an_opaque_and_an_invisible_list_have_colours() -> None:
     for p in range(dump.pixels):
         one = reference.pixel_of(dump, p)
         for k, colour in enumerate(pixel.colours(one, "density-16")):
-            np.testing.assert_allclose(colour, reference.composite(one, k), atol=1e-12)
+            np.testing.assert_allclose(colour, reference.composite(one, k, "density-16"), atol=1e-12)
 
 
-@pytest.mark.parametrize("k_min", [0, 1])
-def test_hulls_are_those_of_the_view(k_min: int) -> None:
+def test_hulls_are_those_of_the_view() -> None:
     curves = error_curves(DUMP, "density")
-    hulls = lower_hulls(curves, k_min)
+    hulls = lower_hulls(curves)
     for p in range(DUMP.pixels):
         curve = curves.error[curves.offsets[p] : curves.offsets[p + 1]]
-        assert pixel.hull(curve, k_min) == hulls.k[hulls.offsets[p] : hulls.offsets[p + 1]].tolist()
+        assert pixel.hull(curve) == hulls.k[hulls.offsets[p] : hulls.offsets[p + 1]].tolist()

@@ -18,18 +18,18 @@ from support.dumps import random_dump
 from support.shards import random_shard
 
 from labeller.columns import COLUMNS
-from labeller.curves import error_curves
+from labeller.curves import error_curves, whole_bins
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
 from labeller.shard_file import open_columns, write_columns
 from labeller.shards import Shard, read_rows, read_shard, write_shard
 from renderer.features import FEATURES, derive, gather
 from schemas.problem import ExitCode, Problem
-from schemas.tail import DEFAULT_TAIL, DENSITY_BINS
+from schemas.tail import DEFAULT_TAIL
 
 DUMP = random_dump(40, 30, 8, seed=1)
-CURVES = error_curves(DUMP)
-HULLS = lower_hulls(CURVES, 1)
+CURVES = whole_bins(DUMP, error_curves(DUMP))
+HULLS = lower_hulls(CURVES)
 BUDGETS = [DUMP.pixels, 2 * DUMP.pixels, 40 * DUMP.pixels]
 
 
@@ -46,7 +46,7 @@ def shard(path: Path) -> Shard:
 
 
 def test_rows_hold_the_hulls_and_features_of_their_pixels(shard: Shard) -> None:
-    features = derive(gather(DUMP, DENSITY_BINS[DEFAULT_TAIL]))
+    features = derive(gather(DUMP, DEFAULT_TAIL))
     assert shard.features.shape == (len(shard.n), len(FEATURES))
     assert np.array_equal(shard.features, features[shard.pixel])
     assert np.array_equal(shard.n, DUMP.counts[shard.pixel])
@@ -57,11 +57,13 @@ def test_rows_hold_the_hulls_and_features_of_their_pixels(shard: Shard) -> None:
         assert np.array_equal(shard.hull_error[mine], HULLS.error[theirs])
 
 
-def test_a_fifth_of_the_pixels_that_can_get_more_is_sampled(shard: Shard) -> None:
-    eligible = int(np.count_nonzero(DUMP.counts > HULLS.k_min))
-    assert shard.meta.eligible == eligible
-    assert len(shard.n) == pytest.approx(0.2 * eligible, abs=1)
-    assert (DUMP.counts[shard.pixel] > HULLS.k_min).all()
+def test_a_fifth_of_the_pixels_with_fragments_is_sampled(shard: Shard) -> None:
+    occupied = int(np.count_nonzero(DUMP.counts))
+    assert shard.meta.occupied == occupied
+    assert len(shard.n) == pytest.approx(0.2 * occupied, abs=1)
+    assert (DUMP.counts[shard.pixel] > 0).all()
+    assert (np.diff(shard.hull_offsets)[shard.n == 1] == 0).all(), "exact at k = 0: no segment"
+    assert (shard.n == 1).any()
     assert shard.sampled_pixels == pytest.approx(0.2 * DUMP.pixels, rel=0.02)
 
 
@@ -70,7 +72,7 @@ def test_levels_are_those_of_the_optimum(shard: Shard) -> None:
     assert [x.budget for x in shard.meta.levels if x.scored] == [b for b in BUDGETS if b < DUMP.total]
     for level in shard.meta.levels:
         (found,) = allocate_curves(DUMP, CURVES, [level.budget], "optimal")
-        assert (level.error, level.bound, level.k_min) == (found.error, found.bound, found.k_min)
+        assert (level.error, level.bound) == (found.error, found.bound)
         assert level.log_lambda == (math.log(found.lam) if found.lam else None)
     low, high = shard.price_range
     assert low < high
@@ -97,12 +99,13 @@ def test_weights_are_named_where_there_are_any(path: Path, tmp_path: Path) -> No
     assert headers[1] == {**headers[0], "weights": "flip"}
 
 
-def test_a_view_in_which_nothing_can_be_gained_has_no_rows(tmp_path: Path) -> None:
+def test_a_view_in_which_nothing_can_be_gained_has_rows_without_segments(tmp_path: Path) -> None:
     dump = random_dump(4, 4, 1, seed=0)
     curves = error_curves(dump)
-    write_shard(tmp_path / "flat", dump, curves, lower_hulls(curves, 1), [dump.pixels])
+    write_shard(tmp_path / "flat", dump, curves, lower_hulls(curves), [dump.pixels])
     shard = read_shard(tmp_path / "flat")
-    assert len(shard.n) == 0
+    assert len(shard.n) > 0
+    assert shard.segments == 0
     assert shard.price_range == (0.0, 0.0)
 
 
@@ -153,7 +156,7 @@ def test_the_file_is_plain_safetensors(path: Path, shard: Shard) -> None:
     row = int(np.argmax(tensors["n"]))
     mine = slice(starts[row], starts[row + 1])
     hull = slice(shard.hull_offsets[row], shard.hull_offsets[row + 1])
-    k = shard.k_min + np.concatenate([[0], np.cumsum(tensors["hull_length"][mine], dtype=np.int64)])
+    k = np.concatenate([[0], np.cumsum(tensors["hull_length"][mine], dtype=np.int64)])
     np.testing.assert_array_equal(k, shard.hull_k[hull])
     np.testing.assert_array_equal(np.append(tensors["hull_error"][mine], 0.0), shard.hull_error[hull])
 
@@ -207,7 +210,7 @@ def test_lists_longer_than_65535_need_wider_columns(tmp_path: Path) -> None:
     write_columns(tmp_path / "wide", columns, {**view, "fragments": 70_002})
     shard = read_shard(tmp_path / "wide")
     np.testing.assert_array_equal(shard.n, [70_000, 2])
-    np.testing.assert_array_equal(shard.hull_k, [1, 69_001, 69_901])
+    np.testing.assert_array_equal(shard.hull_k, [0, 69_000, 69_900])
     np.testing.assert_array_equal(shard.hull_error, np.array([0.5, 0.25, 0.0], np.float32))
     np.testing.assert_array_equal(shard.hull_offsets, [0, 3, 3])
 

@@ -17,30 +17,27 @@ from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
 from labeller.shards import write_shard
 from labeller.skips import budget_skips, needed_budgets, pixel_skips
-from schemas.skips import COMPLETE_BUDGETS, COVERED_PIXELS, EXACT_PIXELS, REPEATED_BUDGETS
+from schemas.skips import COMPLETE_BUDGETS, EXACT_PIXELS, REPEATED_BUDGETS
 
 
-@pytest.mark.parametrize(("k_min", "covered", "exact"), [(1, 2, 1), (0, 0, 2)])
-def test_pixels_that_take_no_part_are_counted_by_reason(k_min: int, covered: int, exact: int) -> None:
-    # Empty; one fragment; one that shows nothing; exact from the first on; exact from none on; to be decided.
-    curves = curves_of([[0.0], [0.5, 0.0], [0.0, 0.0], [0.5, 0.0, 0.0], [0.5, 0.2, 0.0]])
-    if k_min == 0:
-        curves = curves_of([[0.0], [0.5, 0.0], [0.0, 0.0], [0.0, 0.0, 0.0], [0.5, 0.2, 0.0]])
-    skips = pixel_skips(dump_for(curves), lower_hulls(curves, k_min))
-    assert skips == {COVERED_PIXELS: covered, EXACT_PIXELS: exact}
+def test_pixels_that_take_no_part_are_counted() -> None:
+    # Empty; one fragment that shows something; one and two that show nothing; to be decided.
+    curves = curves_of([[0.0], [0.5, 0.0], [0.0, 0.0], [0.0, 0.0, 0.0], [0.5, 0.2, 0.0]])
+    assert pixel_skips(dump_for(curves), lower_hulls(curves)) == {EXACT_PIXELS: 2}
 
 
-def test_pixels_that_are_skipped_have_no_hull_and_get_k_min() -> None:
+def test_pixels_that_are_skipped_have_no_hull_and_get_nothing() -> None:
     dump = random_dump(30, 20, 6, seed=4)
     curves = error_curves(dump)
-    hulls = lower_hulls(curves, 1)
+    hulls = lower_hulls(curves)
     skips = pixel_skips(dump, hulls)
     decided = np.count_nonzero(np.diff(hulls.offsets))
     assert sum(skips.values()) + decided == np.count_nonzero(dump.counts)
     assert all(skips.values())
     (found,) = allocate_curves(dump, curves, [int(0.4 * dump.total)], "optimal", hulls)
     idle = (dump.counts > 0) & (np.diff(hulls.offsets) == 0)
-    assert (found.k[idle] == 1).all()
+    assert (dump.counts[idle] == 1).any(), "one fragment is exact in the tail"
+    assert (found.k[idle] == 0).all()
 
 
 @given(st.lists(st.integers(0, 60), max_size=8), st.integers(0, 50))
@@ -66,7 +63,7 @@ def test_a_shard_computes_no_budget_twice_and_none_that_holds_everything(
     dump = random_dump(12, 9, 6, seed=1)
     curves = error_curves(dump)
     half, everything = dump.total // 2, dump.total
-    write_shard(tmp_path / "view", dump, curves, lower_hulls(curves, 1), [half, half, everything, 2 * everything])
+    write_shard(tmp_path / "view", dump, curves, lower_hulls(curves), [half, half, everything, 2 * everything])
     assert asked.count(half) == 1
     assert len(set(asked)) == len(asked)
     assert max(asked) < everything

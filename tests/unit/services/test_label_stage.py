@@ -75,12 +75,12 @@ def test_a_budget_is_allocated_once_and_one_that_holds_everything_never(folder: 
 
 
 def test_what_took_no_part_is_counted(facts: Facts, folder: Path) -> None:
-    exact = facts["skips"].pop("pixels already exact at k_min")
+    exact = facts["skips"].pop("pixels exact at k = 0")
     assert facts["skips"] == {
-        "pixels that k_min covers": int(np.count_nonzero(DUMP.counts == 1)),
         "budgets that hold all fragments of a view": 2,
         "budgets given more than once": 1,
     }
+    assert exact >= np.count_nonzero(DUMP.counts == 1)
     vertices = np.diff(read_shard(folder / SHARD).hull_offsets)
     assert np.count_nonzero(vertices == 0) == pytest.approx(0.2 * exact, abs=6), "the rows are a fifth of the pixels"
 
@@ -111,5 +111,5 @@ def test_weights_are_in_the_rows_alone(facts: Facts, folder: Path, tmp_path_fact
     counted = flip_weights(DUMP, kept, "density")
     first = weighted.hull_offsets[:-1][np.diff(weighted.hull_offsets) > 0]
     pixel = weighted.pixel[np.diff(weighted.hull_offsets) > 0]
-    at_least = usual.at(np.minimum(DUMP.counts, 1))[pixel]
+    at_least = usual.at(np.zeros_like(DUMP.counts))[pixel]
     np.testing.assert_allclose(weighted.hull_error[first], counted[pixel] * at_least, rtol=1e-5)

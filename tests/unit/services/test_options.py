@@ -15,6 +15,7 @@ from services.options import (
     BuildOptions,
     check_budget,
     check_steepness,
+    check_trained_tail,
     chosen_tail,
     default_holdout,
     parse_budgets,
@@ -35,12 +36,12 @@ def scenes(tmp_path: Path) -> tuple[Path, ...]:
 @pytest.mark.parametrize(
     ("tail", "g", "trained", "expected"),
     [
-        (None, None, None, ("density-16", 0.75)),
-        (None, 2.0, None, ("density-16", 2.0)),
-        (None, None, ("density", 0.5), ("density", 0.5)),
-        ("density", None, ("density", 0.5), ("density", 0.5)),
-        ("density", 2.0, ("density", 0.5), ("density", 2.0)),
-        ("density-8", None, ("density", 0.5), ("density-8", 0.75)),
+        (None, None, None, ("binned-12", 0.75)),
+        (None, 2.0, None, ("binned-12", 2.0)),
+        (None, None, ("binned-8", 0.5), ("binned-8", 0.5)),
+        ("binned-8", None, ("binned-8", 0.5), ("binned-8", 0.5)),
+        ("density", 2.0, ("binned-8", 0.5), ("density", 2.0)),
+        ("binned-16", None, ("binned-8", 0.5), ("binned-16", 0.75)),
     ],
 )
 def test_a_tail_is_the_one_asked_for_else_the_bundle_s_else_the_usual_one(
@@ -48,6 +49,26 @@ def test_a_tail_is_the_one_asked_for_else_the_bundle_s_else_the_usual_one(
 ) -> None:
     found = chosen_tail(tail, g, None if trained is None else TailSpec(name=trained[0], g=trained[1]))
     assert (found.name, found.g) == expected
+
+
+def test_a_bundle_is_made_only_for_a_tail_with_depth_bins(scenes: tuple[Path, ...]) -> None:
+    assert BuildOptions(scenes, "glass", tail="density-16").tail == "density-16"
+    for tail in ("density", "exact-coverage", "weighted-average", "paper"):
+        with pytest.raises(Problem, match=f"cannot be made for the tail {tail}: it has no depth bins") as caught:
+            BuildOptions(scenes, "glass", tail=tail)
+        assert caught.value.remedy == "Use one of binned-8, binned-12, binned-16, density-16: --tail binned-12."
+
+
+def test_a_bundle_is_rendered_with_its_own_tail() -> None:
+    trained = TailSpec(name="binned-12", g=0.75)
+    for tail, own in ((None, trained), ("binned-12", trained), ("paper", None)):
+        check_trained_tail(tail, own)  # type: ignore[arg-type]
+    with pytest.raises(Problem, match="trained with the tail binned-12, and cannot be rendered with paper") as caught:
+        check_trained_tail("paper", trained)
+    assert caught.value.remedy == "Leave out --tail or the techniques that need a bundle."
+    with pytest.raises(Problem) as caught:
+        check_trained_tail("binned-8", trained)
+    assert "`diaphane build --tail binned-8`" in caught.value.remedy
 
 
 def test_a_steepness_beside_a_bundle_needs_the_tail_that_it_is_of() -> None:

@@ -160,7 +160,7 @@ def test_one_held_out_scene_of_two_without_a_transparent_view_leaves_the_other_s
 def test_what_took_no_part_in_the_labels_is_counted_over_all_views() -> None:
     runner = TableRunner()
     run(runner, spec())
-    assert runner.progress.skips["pixels already exact at k_min"] == 3 * 6
+    assert runner.progress.skips["pixels exact at k = 0"] == 3 * 6
     assert "budgets given more than once" not in runner.progress.skips, "what did not occur is not mentioned"
 
 

@@ -29,16 +29,16 @@ from schemas.bundle import (
     load_manifest,
 )
 from schemas.problem import Problem
+from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, TAIL_NAMES, TailName
 from trainer.bundle import Description, export_bundle, load_bundle
 from trainer.export_forms import float_forms
 from trainer.weights import Weights
 
-NAMES = ("log_n", "optical_depth", "rgb_std_g", "depth_std")
+NAMES = ("log_n", "optical_depth", "rgb_std_g", "front_3")
 DESCRIPTION = Description(
     name="glass",
-    tail=TailSpec(name="density", g=0.75),
+    tail=TailSpec(name=DEFAULT_TAIL, g=0.75),
     metric="display",
-    k_min=1,
     provenance=Provenance(scenes={"vase": "ab12"}, code_version="cd34", seed=0, machine="a test"),
     evaluation={"q": {"1": 0.5}},
 )
@@ -84,7 +84,6 @@ def test_a_network_that_float16_does_not_bear_has_no_files_in_it(gl: moderngl.Co
         manifest = export_bundle(folder, weights, DESCRIPTION, real_features(500, 1), gl)
         assert set(manifest.files) == set(FILES) - set(HALF_FILES)
         assert {path.name for path in folder.iterdir()} == {*manifest.files, MANIFEST}
-        assert manifest.self_test is not None
         assert GLSL_HALF not in manifest.self_test.tolerance
         assert load_manifest(folder) == manifest
 
@@ -102,7 +101,6 @@ def test_what_the_network_does_not_use_is_left_out(gl: moderngl.Context, tmp_pat
 def test_the_self_test_is_of_real_inputs_and_right(folder: Path) -> None:
     weights, manifest = random_weights(1, NAMES, (8,)), load_manifest(folder)
     test, features = manifest.self_test, real_features(500, 1)
-    assert test is not None
     assert len(test.features) == len(test.outputs) == 16
     rows = np.array(test.features, np.float32)
     assert all((features[:, weights.columns] == row).all(axis=1).any() for row in rows)
@@ -115,19 +113,14 @@ def test_the_self_test_is_of_real_inputs_and_right(folder: Path) -> None:
     assert test.output_scale == tuple(np.maximum(1.0, np.abs(weights.run(features)).max(axis=0)))
 
 
-def test_a_bundle_of_the_first_format_is_read(folder: Path) -> None:
+@pytest.mark.parametrize("tail", [name for name in TAIL_NAMES if name not in BINNED_TAILS])
+def test_a_tail_without_bins_is_refused(folder: Path, tail: TailName) -> None:
     manifest = json.loads((folder / MANIFEST).read_text())
-    for key in ("outputs", "onnx", "self_test"):
-        del manifest[key]
-    manifest["format"] = "diaphane-bundle/1"
-    manifest["files"] = {name: manifest["files"][name] for name in (WEIGHTS, ONNX, GLSL)}
-    manifest["parity"] = {
-        key: manifest["parity"][key] for key in ("count", "tolerance", "torch_onnx", "torch_glsl", "driver")
-    }
+    manifest["tail"]["name"] = tail
     (folder / MANIFEST).write_text(json.dumps(manifest))
-    bundle = load_bundle(folder)
-    assert bundle.manifest.outputs == bundle.weights.outputs == ("a", "b")
-    assert bundle.manifest.parity.worst == max(manifest["parity"][key] for key in ("torch_onnx", "torch_glsl"))
+    with pytest.raises(Problem, match=f"tail {tail} has no depth bins; one of binned-8, .* has") as caught:
+        load_manifest(folder)
+    assert "build it again" in caught.value.remedy
 
 
 def test_predict_glsl_computes_only_the_features_that_are_read(folder: Path) -> None:
@@ -174,8 +167,11 @@ def _set(manifest: dict[str, object], key: str, value: object) -> None:
         (lambda m: m["files"].update({"../model.onnx": m["files"]["model.onnx"]}), "the files must be"),
         (lambda m: m["files"].pop("model.onnx"), "the files must be"),
         (lambda m: m["files"].pop("predict_half.wgsl"), "the files must be"),
-        (lambda m: _set(m, "format", "diaphane-bundle/1"), "the files must be"),
-        (lambda m: m.pop("self_test"), "self_test is missing"),
+        (lambda m: _set(m, "format", "diaphane-bundle/1"), "format"),
+        (lambda m: m.pop("self_test"), "self_test: Field required"),
+        (lambda m: m.pop("onnx"), "onnx: Field required"),
+        (lambda m: m.pop("outputs"), "outputs: Field required"),
+        (lambda m: m["parity"].pop("torch_ubo"), "torch_ubo: Field required"),
         (lambda m: _set(m, "outputs", ["a"]), "does not answer a"),
         (lambda m: _set(m, "outputs", ["b", "a"]), "does not answer b, a"),
         (lambda m: _set(m, "head", "importance"), "does not answer a, b"),

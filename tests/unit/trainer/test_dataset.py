@@ -26,7 +26,6 @@ def view_of(hulls: list[tuple[list[int], list[float]]], prices: tuple[float, flo
         "one",
         features=np.zeros((len(hulls), len(FEATURES)), np.float32),
         n=np.array([max(k, default=2) + 1 for k, _ in hulls], np.int32),
-        k_min=1,
         hull=(
             offsets,
             np.concatenate([np.array(k, np.int32) for k, _ in hulls]),
@@ -39,18 +38,18 @@ def view_of(hulls: list[tuple[list[int], list[float]]], prices: tuple[float, flo
 
 
 def convex_hull(vertices: int) -> tuple[list[int], list[float]]:
-    return list(range(1, vertices + 1)), [float((vertices - k) ** 2) for k in range(1, vertices + 1)]
+    return list(range(vertices)), [float((vertices - 1 - k) ** 2) for k in range(vertices)]
 
 
 def test_segments_are_the_slopes_between_the_vertices() -> None:
-    view = view_of([([1, 3, 4], [1.0, 0.5, 0.0]), ([], []), ([1, 2], [0.25, 0.0])])
+    view = view_of([([0, 2, 3], [1.0, 0.5, 0.0]), ([], []), ([0, 1], [0.25, 0.0])])
     np.testing.assert_array_equal(view.offsets, [0, 2, 2, 3])
     np.testing.assert_allclose(view.slopes, [0.25, 0.5, 0.25])
     np.testing.assert_array_equal(view.lengths, [2, 1, 1])
 
 
 def hull_errors(view: ViewData, k: NDArray[np.float64]) -> NDArray[np.float64]:
-    ks = 1.0 + np.concatenate([[0.0], np.cumsum(view.lengths)])
+    ks = np.concatenate([[0.0], np.cumsum(view.lengths)])
     drops = (view.slopes * view.lengths).astype(np.float64)
     return np.asarray(np.interp(k, ks, drops.sum() - np.concatenate([[0.0], np.cumsum(drops)])), dtype=np.float64)
 
@@ -61,7 +60,7 @@ def test_long_hulls_are_simplified_from_above_and_stay_convex() -> None:
     assert len(view.slopes) == SEGMENTS
     assert (np.diff(view.slopes) < 0.0).all()
     assert view.lengths.sum() == 89
-    simplified = hull_errors(view, np.arange(1.0, 91.0))
+    simplified = hull_errors(view, np.arange(90.0))
     assert (simplified >= np.array(errors) - 1e-3).all()
     assert (simplified - np.array(errors)).max() < 0.002 * errors[0]
 
@@ -155,11 +154,10 @@ def test_shards_become_views(tmp_path: Path) -> None:
     dump = random_dump(60, 40, 9, seed=1)
     curves = error_curves(dump)
     path = tmp_path / "view.safetensors"
-    write_shard(path, dump, curves, lower_hulls(curves, 1), [dump.total // 3], fraction=0.5, seed=2)
+    write_shard(path, dump, curves, lower_hulls(curves), [dump.total // 3], fraction=0.5, seed=2)
     shard = read_shard(path)
     (view,) = load_shards([path], ["box"])
     assert view.asset == "box"
-    assert view.k_min == 1
     np.testing.assert_array_equal(view.features, shard.features)
     np.testing.assert_allclose(view.anchors, shard.anchors)
     row = int(np.argmax(view.n))
@@ -172,7 +170,7 @@ def test_shards_become_views(tmp_path: Path) -> None:
 def test_shards_of_single_layers_are_refused(tmp_path: Path) -> None:
     dump = random_dump(8, 8, 1, seed=1)
     curves = error_curves(dump)
-    write_shard(tmp_path / "flat", dump, curves, lower_hulls(curves, 1), [10])
+    write_shard(tmp_path / "flat", dump, curves, lower_hulls(curves), [10])
     with pytest.raises(Problem, match="nothing to learn"):
         load_shards([tmp_path / "flat"], ["flat"])
 

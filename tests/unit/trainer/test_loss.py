@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from trainer.loss import lagrangian_regret
 
 
-def brute_force(k: float, k_min: int, slopes: list[float], lengths: list[int], lam: float) -> float:
+def brute_force(k: float, slopes: list[float], lengths: list[int], lam: float) -> float:
     """`(E(k) + lam k - min_j (E(j) + lam j)) / lam`, E the interpolated hull through its vertices."""
-    ks = k_min + np.concatenate([[0], np.cumsum(lengths)])
+    ks = np.concatenate([[0], np.cumsum(lengths)])
     drops = np.array(slopes) * np.array(lengths)
     errors = drops.sum() - np.concatenate([[0.0], np.cumsum(drops)])
     cost = np.interp(k, ks, errors) + lam * k
@@ -38,34 +38,36 @@ def test_regret_is_that_of_the_definition(
 ) -> None:
     slopes = sorted((math.exp(s) for s, _ in hull), reverse=True)
     lengths = [length for _, length in hull]
-    n = 1 + sum(lengths) + extra
+    n = sum(lengths) + extra
     r, _ = lagrangian_regret(
-        *tensors(a, b, n, 1.0), torch.tensor([slopes]), torch.tensor([lengths]).float(), *tensors(log_lambda)
+        *tensors(a, b, n), torch.tensor([slopes]), torch.tensor([lengths]).float(), *tensors(log_lambda)
     )
-    k = min(max(1.0 + (a - log_lambda) / b, 1.0), n)
-    expected = brute_force(k, 1, slopes, lengths, math.exp(log_lambda))
+    k = min(max(1.0 + (a - log_lambda) / b, 0.0), n)
+    expected = brute_force(k, slopes, lengths, math.exp(log_lambda))
     assert float(r) == pytest.approx(expected, rel=1e-3, abs=1e-3)
 
 
 def test_the_optimum_has_no_regret_at_all() -> None:
     slopes, lengths = torch.tensor([[0.5, 0.01, 0.0]]), torch.tensor([[2.0, 3.0, 0.0]])
-    # log lambda between the slopes: take the first segment, k* = 1 + 2.
-    r, overshoot = lagrangian_regret(*tensors(2.0 - 2.0, 1.0, 6.0, 1.0), slopes, lengths, *tensors(-2.0))
+    # log lambda between the slopes: take the first segment, k* = 2.
+    r, overshoot = lagrangian_regret(*tensors(1.0 - 2.0, 1.0, 6.0), slopes, lengths, *tensors(-2.0))
     assert float(r) == 0.0
     assert float(overshoot) == 0.0
 
 
-def test_a_pixel_without_a_hull_regrets_every_fragment_beyond_the_first() -> None:
+def test_a_pixel_without_a_hull_regrets_every_fragment() -> None:
     nothing = torch.zeros(1, 3)
-    r, _ = lagrangian_regret(*tensors(1.0, 1.0, 9.0, 1.0), nothing, nothing, *tensors(-3.0))
-    assert float(r) == pytest.approx(4.0)
+    r, _ = lagrangian_regret(*tensors(1.0, 1.0, 9.0), nothing, nothing, *tensors(-3.0))
+    assert float(r) == pytest.approx(5.0)
+    r, overshoot = lagrangian_regret(*tensors(-9.0, 1.0, 9.0), nothing, nothing, *tensors(-3.0))
+    assert float(r) == float(overshoot) == 0.0, "k = 0, where the optimum is"
 
 
 @pytest.mark.parametrize(("a", "direction"), [(20.0, 1.0), (-20.0, -1.0)])
 def test_a_clamped_count_on_the_wrong_side_still_has_a_gradient(a: float, direction: float) -> None:
     slopes, lengths = torch.tensor([[0.5, 1e-5]]), torch.tensor([[2.0, 4.0]])
     gain = torch.tensor([a], requires_grad=True)
-    r, overshoot = lagrangian_regret(gain, *tensors(1.0, 7.0, 1.0), slopes, lengths, *tensors(-4.0))
+    r, overshoot = lagrangian_regret(gain, *tensors(1.0, 7.0), slopes, lengths, *tensors(-4.0))
     (r + overshoot).sum().backward()
     assert float(r.detach()) > 0.5
     assert gain.grad is not None
@@ -74,5 +76,5 @@ def test_a_clamped_count_on_the_wrong_side_still_has_a_gradient(a: float, direct
 
 def test_a_count_clamped_where_the_optimum_is_costs_nothing() -> None:
     slopes, lengths = torch.tensor([[0.5]]), torch.tensor([[4.0]])
-    r, overshoot = lagrangian_regret(*tensors(20.0, 1.0, 5.0, 1.0), slopes, lengths, *tensors(-4.0))
+    r, overshoot = lagrangian_regret(*tensors(20.0, 1.0, 4.0), slopes, lengths, *tensors(-4.0))
     assert float(r) == float(overshoot) == 0.0

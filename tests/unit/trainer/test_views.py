@@ -30,7 +30,7 @@ def shards(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
         dump = random_dump(SIDE, SIDE, 6, seed=number)
         curves = error_curves(dump)
         path = folder / f"{number}.safetensors"
-        write_shard(path, dump, curves, lower_hulls(curves, 1), [dump.total // 3], fraction=1.0, seed=2)
+        write_shard(path, dump, curves, lower_hulls(curves), [dump.total // 3], fraction=1.0, seed=2)
         paths.append(path)
     return paths
 
@@ -46,7 +46,7 @@ def on_disk(shards: list[Path]) -> list[ShardView]:
 
 
 def assert_same(one: ViewData, two: ViewData) -> None:
-    assert (one.asset, one.k_min, one.price_range) == (two.asset, two.k_min, two.price_range)
+    assert (one.asset, one.price_range) == (two.asset, two.price_range)
     assert one.sampled_pixels == pytest.approx(two.sampled_pixels)
     for name in ("features", "n", "offsets", "slopes", "lengths", "anchors", "price_grid", "scale_grid"):
         np.testing.assert_array_equal(getattr(one, name), getattr(two, name))

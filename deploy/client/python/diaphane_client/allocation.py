@@ -1,161 +1,139 @@
-"""From a network's answers to fragment counts that use a budget exactly: what the renderer's passes do, in numpy.
+"""From a network's answers to the whole bins that are every pixel's core: what the renderer's passes do, in numpy.
 
-`allocate` looks for `t = -log lambda` on the lattice of prices that the shaders search, and so finds the same counts to
-the fragment; `fill` spends a budget in proportion to weights. METHOD section 4 has both rules.
+METHOD section 4 has the rule. Arithmetic is float32, operation by operation, and sums are of integers, so that the cuts
+are those of the shaders to the bit.
 """
 
 from __future__ import annotations
 
-import math
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-MOST_FRAGMENTS: Final = 60_000
-"""Fragments of one pixel that can be kept."""
+from diaphane_client.constants import (
+    DROPPED_BITS,
+    FULL,
+    HALF_BITS,
+    LEAST_FALL,
+    MOST_BINS,
+    MOST_CORE,
+    MOST_FALL,
+    MOST_GAIN,
+)
 
-_SHIFT: Final = 9
-"""Digits of float32 that prices do without."""
-_LAST: Final = 115 << (23 - _SHIFT)
-"""Index of the greatest price, 2^115: at the ends of the lattice every curve gives n and k_min."""
-_MOST_GAIN: Final = 2.0**100
-_LEAST_DECAY: Final = 2.0**-12
-_MOST_DECAY: Final = 2.0**98
-"""Curves are clamped to these |a| and b, so that nothing overflows."""
-_LEAST_WEIGHT: Final = 1e-200
-"""Weights below this share of the largest count as zero."""
+_HALVES: Final = 1 << HALF_BITS
 
 
-def allocate(
-    a: NDArray[np.floating], b: NDArray[np.floating], n: NDArray[np.integer], F: int
-) -> tuple[NDArray[np.int32], float]:
-    """Counts of predicted gain curves at the one lambda that uses a budget.
+@dataclass(frozen=True)
+class Cuts:
+    """Cores that meet a budget.
 
-    `k = clamp(floor(1.5 + (a - log lambda) / b), k_min, n)`; k_min is 1 where the budget covers every occupied pixel,
-    else 0. What is left goes to the pixels that grow at the next lower lambda, by index.
+    Attributes:
+        cut: int32 [P], bins in each pixel's core, from the nearest.
+        k: int32 [P], fragments in them; their sum is at most the budget, and less by at most one bin of one pixel.
+        complete: Whether all that can be in a core is.
+    """
+
+    cut: NDArray[np.int32]
+    k: NDArray[np.int32]
+    complete: bool
+
+
+def allocate(a: NDArray[np.floating], b: NDArray[np.floating], counts: NDArray[np.integer], F: int) -> Cuts:
+    """Whole bins of predicted gain curves at the one price that uses a budget.
+
+    A cut of N fragments after one of M is worth it from the price `b ((M + N) / 2 - 1) - a` on. What is left at the
+    price goes to the pixels that grow at the next one, by index, until one does not fit.
 
     Args:
         a: [P], log gain of the first fragment.
-        b: [P], decay of the log gain per fragment, > 0. Where a or b is NaN, of a network that overflowed, the pixel
+        b: [P], fall of the log gain per fragment, > 0. Where a or b is NaN, of a network that overflowed, the pixel
             comes last: the least a, the greatest b.
-        n: int [P], fragments of each pixel; at most `MOST_FRAGMENTS` of them are used.
+        counts: int [P, bins], fragments in each depth bin; 255 for that many or more, which are never in a core.
         F: Fragments to spend.
-
-    Returns:
-        int32 [P] with `sum k = min(F, sum n)`, and log lambda: -inf where the budget covers everything.
 
     Raises:
         ValueError: An argument is not as described.
     """
-    gain, decay = _numbers(a, n), _numbers(b, n)
-    if (decay <= 0.0).any():
+    growth = _usable(counts, F)
+    gain, fall = _numbers(a, len(growth)), _numbers(b, len(growth))
+    if (fall <= 0.0).any():
         raise ValueError("b must be positive")
-    usable = _usable(n, F)
-    if usable.sum() <= F:
-        return usable.astype(np.int32), -math.inf
-    k_min = _k_min(usable, F)
-    opened = np.flatnonzero(usable > k_min)
-    most = usable[opened]
-    # Of NaN and another number, fmin and fmax are the other.
-    offset = np.fmin(np.fmax(gain[opened], -_MOST_GAIN), _MOST_GAIN).astype(np.float32)
-    slope = np.fmax(np.fmin(decay[opened], _MOST_DECAY), _LEAST_DECAY).astype(np.float32)
-    rate = np.float32(1.0) / slope
-
-    def counts(index: int) -> NDArray[np.int64]:
-        k = np.floor((offset + _price(index)) * rate + np.float32(1.5))
-        return np.asarray(np.clip(k, np.float32(k_min), most.astype(np.float32)), dtype=np.int64)
-
-    k = np.minimum(usable, k_min)
-    left = F - int(k.sum()) + k_min * len(opened)
-    low, high = -_LAST, _LAST  # the counts at low are within what is left, those at high are not
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if counts(middle).sum() <= left else (low, middle)
-    k[opened] = _spent(counts(low), counts(high), left)
-    return k.astype(np.int32), -float(_price(low))
+    grows = growth > 0
+    if growth.sum() <= F:
+        return _cuts(growth, grows, complete=True)
+    rank = _ranks(*_within_limits(gain, fall), growth)
+    high, left = _first_beyond(rank >> HALF_BITS, growth, F)
+    low, left = _first_beyond(rank & (_HALVES - 1), np.where(rank >> HALF_BITS == high, growth, 0), left)
+    chosen = high << HALF_BITS | low
+    more = growth * (rank == chosen)
+    fits = np.cumsum(more.sum(axis=1)) <= left
+    return _cuts(growth, grows & ((rank < chosen) | ((rank == chosen) & fits[:, None])), complete=False)
 
 
-def fill(weights: NDArray[np.floating], n: NDArray[np.integer], F: int) -> NDArray[np.int32]:
-    """Counts in proportion to weights: floor, clamp to k_min and n, the remainder by largest fraction, then by index.
+def importance_curve(importance: NDArray[np.floating]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Importances as curves whose k at a price t is nearest to `t w - .5`, for `allocate`.
 
     Args:
-        weights: [P], finite, >= 0. Pixels of weight 0 get more than k_min only once all others are full.
-        n: int [P], as for `allocate`; so is k_min.
-        F: Fragments to spend.
+        importance: [P], 0 to 1, or NaN, of a network that overflows: that is none.
 
     Returns:
-        int32 [P] with `sum k = min(F, sum n)`.
-
-    Raises:
-        ValueError: An argument is not as described.
+        float32 [P], a and b.
     """
-    shares = _numbers(weights, n)
-    if not (np.isfinite(shares) & (shares >= 0.0)).all():
-        raise ValueError("weights must be finite and not negative")
-    usable = _usable(n, F)
-    if usable.sum() <= F:
-        return usable.astype(np.int32)
-    k_min = _k_min(usable, F)
-    k = np.minimum(usable, k_min)
-    opened = np.flatnonzero(usable > k_min)
-    shares, most = shares[opened], usable[opened]
-    weighted = shares > _LEAST_WEIGHT * shares.max()
-    left = F - int(k.sum()) + k_min * len(opened) - k_min * int(np.count_nonzero(~weighted))
-    if left >= most[weighted].sum():
-        k[opened[weighted]] = most[weighted]
-        rest = opened[~weighted]
-        k[rest] = _by_scale(np.ones(len(rest)), usable[rest], F - int(k.sum()) + k_min * len(rest), k_min)
-    else:
-        k[opened[weighted]] = _by_scale(shares[weighted] / shares.max(), most[weighted], left, k_min)
-    return k.astype(np.int32)
+    # Of NaN and another number, fmax is the other.
+    weight = np.fmax(np.asarray(importance, dtype=np.float32), np.float32(1.0 / MOST_FALL))
+    fall = np.float32(1.0) / weight
+    return np.maximum(np.float32(-1.5) * fall, np.float32(-MOST_GAIN)), fall
 
 
-def _by_scale(shares: NDArray[np.float64], n: NDArray[np.int64], left: int, k_min: int) -> NDArray[np.int64]:
-    """`clamp(floor(scale * shares), k_min, n)` at the largest scale within a budget, and the next one for the rest."""
-
-    def counts(bits: int) -> NDArray[np.int64]:
-        scale = np.array([bits]).view(np.float64)[0]
-        return np.asarray(np.clip(np.floor(scale * shares), k_min, n), dtype=np.int64)
-
-    # Float64 numbers that are not negative have the order of their bits.
-    enough = np.array([2.0 * float((n / shares).max(initial=1.0))])
-    low, high = 0, int(enough.view(np.int64)[0])
-    while high - low > 1:
-        middle = (low + high) // 2
-        low, high = (middle, high) if counts(middle).sum() <= left else (low, middle)
-    return _spent(counts(low), counts(high), left)
+def _within_limits(
+    gain: NDArray[np.float32], fall: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    gain = np.fmin(np.fmax(gain, np.float32(-MOST_GAIN)), np.float32(MOST_GAIN))
+    return gain, np.fmax(np.fmin(fall, np.float32(MOST_FALL)), np.float32(LEAST_FALL))
 
 
-def _spent(k: NDArray[np.int64], more: NDArray[np.int64], left: int) -> NDArray[np.int64]:
-    """Counts that grow from k towards more, by index, until they sum to a budget."""
-    growth = more - k
-    before = np.cumsum(growth) - growth
-    return np.asarray(k + np.clip(left - int(k.sum()) - before, 0, growth), dtype=np.int64)
+def _ranks(gain: NDArray[np.float32], fall: NDArray[np.float32], growth: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Ranks of the prices of all cuts, [P, bins]: the upper bits of float32, in their order."""
+    after = np.cumsum(growth, axis=1)
+    steps = np.float32(0.5) * (2 * after - growth).astype(np.float32) - np.float32(1.0)
+    price = fall[:, None] * steps - gain[:, None]
+    bits = price.view(np.uint32).astype(np.int64)
+    return np.asarray(np.where(bits >> 31 == 1, 0xFFFFFFFF - bits, bits + 0x80000000) >> DROPPED_BITS)
 
 
-def _price(index: int) -> np.float32:
-    """The t of an index from -_LAST to _LAST: does not fall with it, and is 0 at 0."""
-    bits = np.array([0x3F800000 + (abs(index) << _SHIFT)], dtype=np.uint32)
-    magnitude = bits.view(np.float32)[0] - np.float32(1.0)
-    return np.float32(-magnitude if index < 0 else magnitude)
+def _first_beyond(half: NDArray[np.int64], growth: NDArray[np.int64], left: int) -> tuple[int, int]:
+    """The first of the 2^HALF_BITS numbers up to which more fragments come than are left, and what is left before."""
+    counted = np.bincount(half[growth > 0], weights=growth[growth > 0], minlength=_HALVES)
+    spent = np.cumsum(counted).astype(np.int64)
+    found = int(np.searchsorted(spent, left, side="right"))
+    return found, left - (int(spent[found - 1]) if found else 0)
 
 
-def _usable(n: NDArray[np.integer], F: int) -> NDArray[np.int64]:
-    counts = np.asarray(n)
-    if counts.ndim != 1 or not np.issubdtype(counts.dtype, np.integer) or (len(counts) and counts.min() < 0):
-        raise ValueError("n must be a row of counts")
+def _cuts(growth: NDArray[np.int64], granted: NDArray[np.bool_], *, complete: bool) -> Cuts:
+    cut = (np.arange(1, growth.shape[1] + 1) * granted).max(axis=1, initial=0)
+    return Cuts(cut.astype(np.int32), (growth * granted).sum(axis=1).astype(np.int32), complete)
+
+
+def _usable(counts: NDArray[np.integer], F: int) -> NDArray[np.int64]:
+    """int64 [P, bins], fragments of the bins that can be in a core; 0 from the first one on that cannot."""
+    given = np.asarray(counts)
+    if given.ndim != 2 or not 1 <= given.shape[1] <= MOST_BINS or not np.issubdtype(given.dtype, np.integer):
+        raise ValueError("counts must be whole numbers, a row for each pixel and a column for each bin")
+    if given.size and given.min() < 0:
+        raise ValueError("counts must not be negative")
     if F < 0:
         raise ValueError("the budget must not be negative")
-    return np.minimum(counts.astype(np.int64), MOST_FRAGMENTS)
+    own = np.minimum(given, FULL).astype(np.int64)
+    fits = (own < FULL) & (np.cumsum(own, axis=1) <= MOST_CORE)
+    return np.asarray(np.where(np.logical_and.accumulate(fits, axis=1), own, 0))
 
 
-def _k_min(usable: NDArray[np.int64], F: int) -> int:
-    return int(np.count_nonzero(usable) <= F)
-
-
-def _numbers(values: NDArray[np.floating], n: NDArray[np.integer]) -> NDArray[np.float64]:
-    numbers = np.asarray(values, dtype=np.float64)
-    if numbers.shape != np.shape(n):
+def _numbers(values: NDArray[np.floating], pixels: int) -> NDArray[np.float32]:
+    with np.errstate(over="ignore"):  # what is beyond float32 is infinite, and then within the limits
+        numbers = np.asarray(values, dtype=np.float32)
+    if numbers.shape != (pixels,):
         raise ValueError("there must be one number for each pixel")
     return numbers

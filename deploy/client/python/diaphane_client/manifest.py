@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, Final
 
+from diaphane_client.constants import BINS
+
 MANIFEST: Final = "manifest.json"
 WEIGHTS: Final = "weights.safetensors"
 
@@ -34,7 +36,7 @@ HEADS: Final[Mapping[str, tuple[tuple[str, ...], ...]]] = {
 _FORMATS: Final = ("diaphane-bundle/1", "diaphane-bundle/2")
 _ALWAYS: Final = frozenset(
     (
-        *("format", "name", "features", "hidden", "layers", "tail", "metric", "k_min", "files"),
+        *("format", "name", "features", "hidden", "layers", "tail", "metric", "files"),
         *("parity", "provenance", "evaluation"),
     )
 )
@@ -80,8 +82,7 @@ class Manifest:
         outputs: What the network answers, in this order; one of `HEADS[head]`.
         features: Inputs, in order.
         hidden: Units of each hidden layer (ReLU).
-        tail: Name of the tail that has to be rendered.
-        g: The density tail's constant.
+        tail: Name of the tail that has to be rendered, one with depth bins.
         files: Every other file.
         self_test: Rows to check the network with; None in the first format.
     """
@@ -91,7 +92,6 @@ class Manifest:
     features: tuple[Feature, ...]
     hidden: tuple[int, ...]
     tail: str
-    g: float
     files: Mapping[str, FileRef]
     self_test: SelfTest | None
 
@@ -157,8 +157,7 @@ def _parsed(fields: Any) -> Manifest:
         outputs=outputs,
         features=features,
         hidden=_hidden(fields["hidden"]),
-        tail=_text(fields["tail"]["name"]),
-        g=_number(fields["tail"]["g"]),
+        tail=_tail(fields["tail"]),
         files=parse_files(fields["files"]),
         self_test=_self_test(fields.get("self_test"), len(features), len(outputs)),
     )
@@ -167,6 +166,14 @@ def _parsed(fields: Any) -> Manifest:
     if WEIGHTS not in manifest.files:
         raise ValueError(f"there is no {WEIGHTS}")
     return manifest
+
+
+def _tail(fields: Mapping[str, Any]) -> str:
+    name = _text(fields["name"])
+    _number(fields["g"])
+    if name not in BINS:
+        raise ValueError(f"the tail {name!r} is not one of {', '.join(BINS)}")
+    return name
 
 
 def _features(fields: Mapping[str, Any]) -> list[Any]:

@@ -1,4 +1,4 @@
-"""A bundle's network on numpy, for those without a GPU: from features and a budget to the fragments of each pixel."""
+"""A bundle's network on numpy, for those without a GPU: from features and a budget to the core of each pixel."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from diaphane_client.allocation import allocate, fill
+from diaphane_client.allocation import Cuts, allocate, importance_curve
+from diaphane_client.constants import BINS
 from diaphane_client.errors import Refused
 from diaphane_client.manifest import MANIFEST, MAX_MANIFEST_BYTES, WEIGHTS, Manifest, parse_manifest
 from diaphane_client.network import Network, read_network
@@ -19,16 +20,13 @@ from diaphane_client.network import Network, read_network
 SELF_TEST_TOLERANCE: Final = 1e-4
 """Largest difference of an answer to the manifest's rows, relative to its scale: another order of sums passes."""
 
-_ONLY_WITH_FRAGMENTS: Final = frozenset(("optical_depth", "alpha_mean", "alpha_nearest"))
-"""Features that are above 0 in every pixel with a fragment that can be seen."""
-
 
 @dataclass(frozen=True)
 class Predictor:
     """A bundle that was read, and whose answers to its own test rows are right.
 
     Attributes:
-        manifest: What it reads and answers, and the tail that has to be rendered with its counts.
+        manifest: What it reads and answers, and the tail that has to be rendered behind its cores.
         network: Its weights.
     """
 
@@ -83,35 +81,27 @@ class Predictor:
             raise ValueError("features must be finite")
         return self.network.answer(inputs)
 
-    def predict(
-        self, features: NDArray[np.floating], F: int, n: NDArray[np.integer] | None = None
-    ) -> NDArray[np.int32]:
-        """The fragments to keep exactly in each pixel, nearest first; the tail holds the others.
+    def predict(self, features: NDArray[np.floating], F: int, counts: NDArray[np.integer]) -> Cuts:
+        """The whole bins to keep exactly in each pixel, from the nearest; the tail holds the others.
 
         Args:
             features: [P, C], columns `features`, not normalised; zeros where a pixel has no fragments.
             F: Fragments to spend on all pixels together.
-            n: int [P], fragments of each pixel; None: what `log_n` says, where the network reads it.
+            counts: int [P, bins], fragments in each of the tail's depth bins; 255 for that many or more.
 
         Returns:
-            int32 [P], k with `sum k = min(F, sum n)`: the counts of the Python renderer, of importances but for ties.
+            The cuts of the Python renderer, `sum k <= F`.
 
         Raises:
-            ValueError: An argument is not as described, or n is needed.
+            ValueError: An argument is not as described.
         """
+        bins = BINS[self.manifest.tail]
+        if np.ndim(counts) != 2 or np.shape(counts)[1] != bins:
+            raise ValueError(f"the tail {self.manifest.tail} has {bins} bins: give as many columns of counts")
         answers = self.answer(features)
-        counts = self._counts(np.asarray(features)) if n is None else np.asarray(n)
         if self.manifest.head == "importance":
-            return fill(np.nan_to_num(answers[:, 0]), counts, F)  # NaN, of a network that overflows, is no importance
-        return allocate(answers[:, 0], answers[:, 1], counts, F)[0]
-
-    def _counts(self, features: NDArray[np.floating]) -> NDArray[np.int64]:
-        # log2 of float32 is exact to far less than a fragment for all counts that a pixel can have.
-        names = self.features
-        if "log_n" not in names or not _ONLY_WITH_FRAGMENTS & set(names):
-            raise ValueError("this network does not read how many fragments a pixel has: give n")
-        n = np.rint(np.exp2(features[:, names.index("log_n")].astype(np.float64)))
-        return np.where((features != 0.0).any(axis=1), n, 0.0).astype(np.int64)
+            return allocate(*importance_curve(answers[:, 0]), counts, F)
+        return allocate(answers[:, 0], answers[:, 1], counts, F)
 
     def _check(self) -> None:
         test = self.manifest.self_test

@@ -13,7 +13,7 @@ export const NETWORK = "predict.wgsl";
 
 const FORMAT = "diaphane-bundle/2";
 const NEEDED = [
-  ...["format", "name", "head", "outputs", "features", "hidden", "layers", "tail", "metric", "k_min", "files"],
+  ...["format", "name", "head", "outputs", "features", "hidden", "layers", "tail", "metric", "files"],
   ...["onnx", "self_test", "parity", "provenance", "evaluation"],
 ];
 const MOST_BYTES = 64 * 2 ** 20;

@@ -20,7 +20,6 @@ export function manifestOf(files: Json): Json {
     layers: [],
     tail: { name: "density-16", g: 0.75 },
     metric: "display",
-    k_min: 1,
     files,
     onnx: {},
     self_test: { features: [[1]], outputs: [[2, 3]], output_scale: [1, 1], tolerance: { "predict.wgsl": 1e-4 } },

@@ -44,11 +44,11 @@ def test_without_equal_memory_there_are_only_fragments(options: BenchOptions) ->
 
 
 def test_the_learned_technique_has_the_tail_of_its_bundle(options: BenchOptions, tmp_path: Path) -> None:
-    bundle = Bundle(tmp_path, "glass@0123", TailSpec(name="exact-coverage", g=0.5))
+    bundle = Bundle(tmp_path, "glass@0123", TailSpec(name="binned-8", g=0.5))
     names = "kbuffer-deep", "kbuffer-temporal"
     learned = replace(options, techniques=names, bundle="somewhere", tails=("density", "paper"))
     cells = planned(learned, bundle)
-    assert {(cell.tail, cell.g, cell.bundle) for cell in cells} == {("exact-coverage", None, "glass@0123")}
+    assert {(cell.tail, cell.g, cell.bundle) for cell in cells} == {("binned-8", None, "glass@0123")}
     assert [cell.technique for cell in cells].count(names[1]) == 4
     assert len(cells) == 8
 
@@ -56,11 +56,11 @@ def test_the_learned_technique_has_the_tail_of_its_bundle(options: BenchOptions,
 def test_the_others_have_the_g_of_a_bundle_of_the_same_tail_unless_one_is_asked_for(
     options: BenchOptions, tmp_path: Path
 ) -> None:
-    bundle = Bundle(tmp_path, "glass@0123", TailSpec(name="density", g=0.5))
+    bundle = Bundle(tmp_path, "glass@0123", TailSpec(name="binned-8", g=0.5))
     for tails, g, expected in [
-        (("density",), None, {("density", 0.5)}),
+        (("density",), None, {("density", 0.75)}),
         (("density", "paper"), 2.0, {("density", 2.0), ("paper", None)}),
-        ((), None, {("density-16", 0.75)}),
+        ((), None, {("binned-12", None)}),
     ]:
         cells = planned(replace(options, bundle="somewhere", tails=tails, g=g), bundle)  # type: ignore[arg-type]
         assert {(cell.tail, cell.g) for cell in cells if cell.tail is not None} == expected

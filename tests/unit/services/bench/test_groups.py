@@ -45,6 +45,19 @@ def test_errors_are_geometric_means_without_the_views_that_the_budget_holds() ->
     assert row.of_all == pytest.approx(150 / 400)
 
 
+def test_a_row_that_fits_nowhere_has_the_most_bytes_of_all_its_views() -> None:
+    large = cell("abuffer-array", problem="A pixel has 9 fragments.", pool_bytes=9000, total_bytes=9900, fits=False)
+    alone = group("", [view(large)]).rows[0]
+    assert (alone.problem, alone.pool_bytes, alone.total_bytes, alone.fits) == (large.problem, 9000, 9900, False)
+    among = group("", [view(cell("abuffer-array")), view(large, key="b")]).rows[0]
+    assert (among.problem, among.views, among.pool_bytes, among.fits) == (None, 1, 9000, False)
+    assert group("", VIEWS).rows[0].fits
+
+
+def test_a_group_is_as_deep_as_its_views_are_on_average() -> None:
+    assert group("", [view(), view(fragments=1000, key="b")]).depth == pytest.approx(7.0)
+
+
 def test_rows_come_without_budget_first_then_by_budget_and_technique() -> None:
     cells = [cell("kbuffer", 4.0), cell("kbuffer-optimal", 1.0), cell("kbuffer", 1.0), cell("moment"), cell("sbuffer")]
     rows = group("", [view(*cells)]).rows
@@ -88,7 +101,7 @@ def test_points_tell_techniques_and_their_tails_apart() -> None:
             look = (datum[points["color"]["field"]], datum[points["shape"]["field"]])
             looks.setdefault(look, set()).add(datum["technique"])
         assert all(len(shown) == 1 for shown in looks.values())
-        assert {"kbuffer", "kbuffer (density-16 g = 0.5)", "kbuffer (exact-coverage)"} < set().union(*looks.values())
+        assert {"kbuffer", "kbuffer (binned-12 g = 0.5)", "kbuffer (exact-coverage)"} < set().union(*looks.values())
         assert len({colour for colour, _ in looks if colour.startswith("kbuffer")}) == 2, "one for all of its tails"
 
 
@@ -124,7 +137,7 @@ def test_what_is_written_under_bars_does_not_overlap() -> None:
 
 
 def test_every_bar_of_a_cluster_looks_different() -> None:
-    tails = ("density-16", "density-8", "density", "exact-coverage", "weighted-average")
+    tails = ("density-16", "binned-8", "density", "exact-coverage", "weighted-average")
     cells = [cell(name, tail=tail) for name in ("kbuffer", "kbuffer-optimal") for tail in tails]
     svg = ElementTree.fromstring(error_bars(groups_of([view(*cells)]), 2.0))
     bars = [bar for bar in svg.iter("{http://www.w3.org/2000/svg}rect") if len(bar)]

@@ -7,7 +7,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from schemas.tail import TAILS
+from schemas.tail import TAIL_NAMES
 from schemas.view import View
 from services.viewer.controls import FACTORS, KEYS, Look, Place, key_help
 from services.viewer.layout import LAYOUTS
@@ -53,8 +53,8 @@ def test_techniques_and_tails_go_round() -> None:
     assert [pressed(*"Q" * n).left for n in range(4)] == ["kbuffer", "sbuffer", "moment", "kbuffer"]
     assert pressed("A").left == "moment"
     assert pressed("W", "S") == LOOK
-    assert pressed(*["T"] * len(TAILS)) == LOOK
-    assert pressed("shift+T").tail == TAILS[TAILS.index("density-16") - 1]
+    assert pressed(*["T"] * len(TAIL_NAMES)) == LOOK
+    assert pressed("shift+T").tail == TAIL_NAMES[TAIL_NAMES.index("density-16") - 1]
 
 
 def test_budgets_stay_in_their_range_and_hold_a_fragment() -> None:

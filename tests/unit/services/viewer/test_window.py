@@ -431,15 +431,18 @@ def test_a_new_bundle_is_taken_while_the_window_is_open(
 def test_a_new_bundle_brings_its_tail_unless_another_one_was_chosen(
     viewer: Viewer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    session, tails = viewer.session, [TailSpec(name="density", g=0.5), TailSpec(name="density-8", g=0.25)]
+    session, tails = viewer.session, [TailSpec(name="binned-16", g=0.5), TailSpec(name="binned-8", g=0.25)]
     monkeypatch.setattr(session.studio, "load", lambda _: tails.pop(0))
     session.load(Path("1.1.0"), "glass@1.1.0")
     assert session.look.tail == "density-16", "it was asked for"
-    session.trained, tails[:] = TailSpec(name="density-16", g=0.75), [tails[0], *tails, TailSpec(name="paper", g=0.0)]
+    session.trained, tails[:] = (
+        TailSpec(name="density-16", g=0.75),
+        [tails[0], *tails, TailSpec(name="binned-12", g=0.0)],
+    )
     cases: list[tuple[TailName, str]] = [
-        ("density-16", "density-8"),
+        ("density-16", "binned-8"),
         ("exact-coverage", "exact-coverage"),
-        ("density-8", "paper"),
+        ("binned-8", "binned-12"),
     ]
     for chosen, shown in cases:
         session.look = replace(session.look, tail=chosen)

@@ -6,7 +6,7 @@ import type { Work } from "../work";
 import type { Frame } from "./frame";
 
 /** Members of `State` in state.wgsl. */
-export const STATE_WORDS = 11 + EDGES;
+export const STATE_WORDS = 10 + EDGES;
 
 /** Blocks of the pixels and of the offset behind the last one. */
 export const blocksOf = (pixels: number): number => Math.floor(pixels / BLOCK) + 1;

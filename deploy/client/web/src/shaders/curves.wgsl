@@ -40,7 +40,7 @@ fn sums_of(p: u32) -> array<vec4f, 11> {
 @compute @workgroup_size(64)
 fn predict_curves(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     let p = thread_of(id, groups);
-    if (p >= arrayLength(&curves) || state.complete == 1u || statistics[p].n <= state.k_min) {
+    if (p >= arrayLength(&curves) || state.complete == 1u || statistics[p].n == 0u) {
         return;
     }
     let y = Answer(diaphane_predict(diaphane_features(sums_of(p))));

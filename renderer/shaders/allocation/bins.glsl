@@ -1,0 +1,32 @@
+// A pixel's bins as an allocation sees them. counts: [P, FOURS] words of 8 bits a bin (gather/bins.frag).
+layout(std430, binding = 1) buffer Counts { uint counts[]; };
+const int FOURS = BINS / 4;
+
+struct PixelBins {
+    uint word[FOURS];
+};
+
+PixelBins bins_of(uint p) {
+    PixelBins bins;
+    for (int i = 0; i < FOURS; ++i) bins.word[i] = counts[p * uint(FOURS) + uint(i)];
+    return bins;
+}
+
+uint count_in(PixelBins bins, int bin) {
+    return bins.word[bin / 4] >> (8 * (bin & 3)) & 255u;
+}
+
+// Fragments of all bins, as far as they are known.
+uint known_fragments(PixelBins bins) {
+    uint sum = 0u;
+    for (int i = 0; i < FOURS; ++i) {
+        uint two = (bins.word[i] & 0x00FF00FFu) + (bins.word[i] >> 8 & 0x00FF00FFu);
+        sum += (two & 0xFFFFu) + (two >> 16);
+    }
+    return sum;
+}
+
+// Whether a bin of so many fragments can be in a core behind `before` others; those behind it cannot where it cannot.
+bool fits(uint own, uint before) {
+    return own < uint(FULL) && before + own <= uint(MOST_CORE);
+}

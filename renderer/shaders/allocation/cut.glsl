@@ -1,0 +1,33 @@
+// What a pixel gets: bins and fragments below the chosen rank, and with what comes at it.
+layout(std430, binding = 2) readonly buffer Curves { vec2 curve[]; };  // [P], a and b
+uniform uint pixels;
+
+struct Cut {
+    uint bins, fragments;            // that are granted
+    uint more_bins, more_fragments;  // with those that come at the rank itself
+};
+
+Cut cut_of(uint p) {
+    Cut cut = Cut(0u, 0u, 0u, 0u);
+    if (p >= pixels) return cut;
+    PixelBins bins = bins_of(p);
+    vec2 gain = complete == 1u ? vec2(0.0) : curve[p];
+    uint before = 0u;
+    bool is_open = true;
+    for (int bin = 0; bin < BINS; ++bin) {
+        uint own = count_in(bins, bin);
+        is_open = is_open && fits(own, before);
+        uint found = complete == 1u ? 0u : rank_of(gain, before, before + own);
+        before += own;
+        if (!is_open || own == 0u) continue;
+        if (complete == 1u || found <= rank) {
+            cut.more_bins = uint(bin) + 1u;
+            cut.more_fragments = before;
+        }
+        if (complete == 1u || found < rank) {
+            cut.bins = uint(bin) + 1u;
+            cut.fragments = before;
+        }
+    }
+    return cut;
+}

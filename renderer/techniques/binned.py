@@ -1,0 +1,45 @@
+"""`binned`: a binned tail and nothing else, two additive passes (METHOD.md 2).
+
+The first pass gathers depth bins, the second weighs every fragment by what they know to be in front of it. There are no
+slots, no atomics, no order of fragments, and no network: additive blending into a few targets is all it needs.
+`kbuffer-deep` is this with a core.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from renderer.frame import Clock, Frame
+from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.chain import TailInputs, tail_targets
+from renderer.techniques.sums import rendered, resolve_mean
+from schemas.tail import TAILS, TailName
+
+DEFAULT_BINS: Final[TailName] = "binned-16"
+
+
+class Binned:
+    """Order-independent transparency by depth bins.
+
+    Args:
+        tail: A tail with bins.
+    """
+
+    name = "binned"
+
+    def __init__(self, tail: TailName = DEFAULT_BINS) -> None:
+        self._tail = tail
+
+    def render(self, frame: Frame, budget: Budget) -> Rendered:
+        """Render a frame. `budget` is not used: what is kept of a pixel does not depend on its fragments."""
+        binned = frame.gather_bins(self._tail)
+        tail = TailInputs(TAILS[self._tail], binned=binned)
+        clock = Clock(frame.ctx)
+        with clock.measure("tail"):
+            colours, depths = tail_targets(frame, tail)
+            target = frame.target([colours, depths])
+            frame.draw_transparent("binned/tail.frag", target, tail.defines, **tail.bind())
+        with clock.measure("resolve"):
+            image = resolve_mean(frame, colours, depths)
+        shared = frame.passes("opaque", "range", "bins")
+        return rendered(frame, image, shared, clock, tail.pixel_bytes, early_bytes=binned.gathered_bytes)
