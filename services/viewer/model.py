@@ -16,7 +16,7 @@ from services.rendering import bundle_folder
 FETCHED = "bundles"
 """Folder of fetched bundles, in that of the state."""
 _EVERY = 5.0
-"""Seconds between two questions for the alias; one about the same version costs an answer without a body."""
+"""Seconds between two questions for the alias; one about the same version costs a small answer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ def remote_source(service: Service) -> Iterator[Source]:
     name, _, alias = service.reference.partition("@")
     asked: dict[str, Any] = {"url": service.url, "key": service.key, "folder": service.state / FETCHED}
     stop, later = threading.Event(), queue.SimpleQueue[Path]()
-    bundles = client.watch(name, alias or "champion", every=_EVERY, stop=stop, allow_rollback=service.follow, **asked)
+    bundles = client.watch(name, alias or "champion", every=_EVERY, stop=stop, **asked)
     try:
         first = next(bundles)
     except client.PullError as error:

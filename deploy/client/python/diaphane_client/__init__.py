@@ -3,7 +3,7 @@
 from diaphane_client.allocation import allocate, fill
 from diaphane_client.errors import Denied, NotFound, PullError, Refused, Unavailable
 from diaphane_client.predictor import Predictor
-from diaphane_client.pulling import cached, pull
+from diaphane_client.pulling import cached, forget, pull
 from diaphane_client.watching import watch
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "allocate",
     "cached",
     "fill",
+    "forget",
     "pull",
     "watch",
 ]
