@@ -60,7 +60,7 @@ def list_versions(name: NamePath, service: Services, paging: Page) -> VersionPag
     openapi_extra=_IF_NONE_MATCH,
 )
 def read_version(name: NamePath, version: VersionPath, request: Request, service: Services) -> Response:
-    """A version, by number or alias. Its ETag lets clients ask often whether an alias has moved."""
+    """A version, by number or alias; what an alias means is signed in its pointer alone."""
     content = service.registry.record(service.registry.resolve(f"{name}@{version}")).model_dump_json().encode()
     tag = hashlib.sha256(content).hexdigest()
     headers = {"ETag": f'"{tag}"'}
