@@ -81,14 +81,16 @@ def require_key(connection: sa.Connection, key: SigningKey) -> None:
         )
 
 
-def row(connection: sa.Connection) -> tuple[HandoverRecord, ...]:
-    """The handovers that lead to the registry's key, oldest first, since a key was lost last."""
-    found = connection.execute(sa.select(handovers).order_by(handovers.c.id.desc()).limit(MAX_HANDOVERS)).all()
-    records: list[HandoverRecord] = []
-    for each in found:
-        if each.statement is None:
+def row(connection: sa.Connection, key: SigningKey) -> tuple[HandoverRecord, ...]:
+    """The handovers that lead to a key, oldest first, since a key was lost last."""
+    wanted, records = key.public_key, list[HandoverRecord]()
+    for each in connection.execute(sa.select(handovers).order_by(handovers.c.id.desc())):
+        if each.new_key != wanted:  # a later one, of a moment ago
+            continue
+        if each.statement is None or len(records) == MAX_HANDOVERS:
             break
         records.insert(0, HandoverRecord(statement=each.statement, signature=each.signature))
+        wanted = each.old_key
     return tuple(records)
 
 
@@ -122,7 +124,14 @@ def rotate(database: Database, settings: Settings, new_seed: bytes | None = None
         return _hand_over(database, Signer.open(settings).key, SigningKey(new_seed))
     old = Signer.open(settings).key
     make_key_file(following, new_seed)
-    made = _hand_over(database, old, SigningKey(read_seed(following)))
+    seed = read_seed(following)
+    if new_seed not in (None, seed):
+        raise Problem(
+            f"A rotation to another key was cut short: {following} has that key.",
+            "Run the command without --new-key, which ends that one; then repeat this.",
+            ExitCode.CONFLICT,
+        )
+    made = _hand_over(database, old, SigningKey(seed))
     following.replace(path)
     sync(path.parent)
     return made

@@ -56,7 +56,7 @@ def pointer(database: Database, key: SigningKey, name: str, selector: str) -> Po
         if found is None:
             return None
         handovers.require_key(connection, key)
-        row = handovers.row(connection)
+        row = handovers.row(connection, key)
     serial = _serial(found.moved)
     issued = int(time.time())
     text = pointer_statement(

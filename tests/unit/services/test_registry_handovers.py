@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import stat
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -104,6 +105,8 @@ def test_a_rotation_that_was_cut_short_is_finished_by_the_next(
                 handovers.rotate(site.database, site.settings)
     with pytest.raises(Problem, match="rotate-signing"):
         site.publish(tmp_path, "c")
+    with pytest.raises(Problem, match="cut short"):
+        handovers.rotate(site.database, site.settings, SEED)
     done = handovers.rotate(site.database, site.settings)
     assert site.registry.public_keys() == [done.public_key, old]
     assert site.registry.pointer("glass", "champion").public_key == done.public_key
@@ -125,6 +128,30 @@ def test_a_key_of_the_settings_is_replaced_by_whoever_starts_the_processes(datab
             attempt()
     with pytest.raises(Problem, match="before"):
         handovers.rotate(new.database, new.settings, b"o" * 32)
+
+
+def test_what_is_published_while_the_key_changes_has_the_new_one(site: Site, tmp_path: Path) -> None:
+    bundles = [make_bundle(tmp_path / f"more-{i}", f"more-{i}") for i in range(12)]
+
+    def publish(bundle: Path) -> None:
+        for _ in range(1000):
+            try:
+                site.registry.publish("glass", bundle, 0.5, {})
+                return
+            except Problem as problem:
+                if problem.code != ExitCode.TRY_AGAIN:  # between the database and the file
+                    raise
+
+    with ThreadPoolExecutor(3) as pool:
+        published = [pool.submit(publish, bundle) for bundle in bundles]
+        for _ in range(3):
+            assert handovers.rotate(site.database, site.settings).left == ()
+        for each in published:
+            each.result()
+    key = site.registry.public_keys()[0]
+    rows = site.rows()
+    assert len(rows) == 14
+    assert all(row.public_key == key and verify(key, row.statement, row.signature) for row in rows)
 
 
 def test_a_version_that_was_changed_in_the_database_is_not_signed_again(site: Site) -> None:

@@ -135,7 +135,8 @@ def cached(
 def forget(name: str, *, folder: str | os.PathLike[str]) -> None:
     """Makes a name as if it had never been seen: the next pull takes what the server's key signs, older or not.
 
-    Files and keys of servers stay. For a server that lost its history, or a folder that lost `trust.json`.
+    Keys of servers stay, and files as long as no other version comes under their number. For a server that lost its
+    history, or a folder that lost `trust.json`.
 
     Args:
         name: Name of the bundle.
