@@ -12,7 +12,6 @@ Rules:
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -21,8 +20,7 @@ import sqlalchemy as sa
 
 from schemas.bundle import MANIFEST, Manifest, load_manifest
 from schemas.problem import ExitCode, Problem
-from schemas.service import FileRef, ModelRecord, MoveRecord, PointerRecord, VersionRecord
-from services.clock import iso
+from schemas.service import ModelRecord, MoveRecord, PointerRecord, VersionRecord
 from services.database import Database
 from services.database.tables import aliases, versions
 from services.registry import handovers, pointers
@@ -30,7 +28,8 @@ from services.registry.aliases import history, local_user, lock_name, move, prev
 from services.registry.checkout import check_out
 from services.registry.names import bundle_files, check_name, digest_of
 from services.registry.records import CANDIDATE, CHAMPION, Aliases, Move, Publication
-from services.registry.signing import Signer, SigningKey, statement
+from services.registry.rows import files_of, publication_of, signed_columns
+from services.registry.signing import Signer
 from services.settings import Settings
 from services.storage import Blobs
 
@@ -63,7 +62,7 @@ class Registry:
         """All versions of a name, oldest first; none if the name is unknown."""
         query = sa.select(versions).where(versions.c.name == check_name(name)).order_by(versions.c.ordinal)
         with self._database.read() as connection:
-            return [_publication(row) for row in connection.execute(query)]
+            return [publication_of(row) for row in connection.execute(query)]
 
     def aliases(self, name: str) -> Aliases:
         """Aliases of a name and their history."""
@@ -108,7 +107,7 @@ class Registry:
             MissingBlob: A file is no longer in the store.
             OSError: The folder cannot be written.
         """
-        files = _files(self._row(publication))
+        files = files_of(self._row(publication))
         return check_out(self._checkouts / publication.name / publication.version, publication, files, self._blobs)
 
     def publish(
@@ -150,12 +149,12 @@ class Registry:
                 handovers.share_key(connection)
                 key = self._signer.key
                 handovers.require_key(connection, key)
-                values = _signed(connection, key, name, digest, files)
+                values = signed_columns(connection, key, name, digest, files)
                 values |= {"score": score, "evaluation": dict(evaluation)}
                 values |= {"artifacts": list(artifacts), "job_id": job_id}
                 connection.execute(versions.insert().values(values))
                 row = connection.execute(known).one()
-            return _publication(row)
+            return publication_of(row)
 
         return self._database.retry(body)
 
@@ -323,14 +322,14 @@ class Registry:
         query = sa.select(versions).where((versions.c.name == name) & (versions.c.version == version))
         with self._database.read() as connection:
             row = connection.execute(query).one_or_none()
-        return None if row is None else _publication(row)
+        return None if row is None else publication_of(row)
 
     def _aliased(self, name: str, alias: str) -> Publication | None:
         meant = (versions.c.name == aliases.c.name) & (versions.c.version == aliases.c.version)
         asked = (aliases.c.name == name) & (aliases.c.alias == alias)
         with self._database.read() as connection:
             row = connection.execute(sa.select(versions).join(aliases, meant).where(asked)).one_or_none()
-        return None if row is None else _publication(row)
+        return None if row is None else publication_of(row)
 
     def _row(self, publication: Publication) -> Any:
         mine = (versions.c.name == publication.name) & (versions.c.version == publication.version)
@@ -343,7 +342,7 @@ class Registry:
             **publication.model_dump(),
             parity=manifest.parity.model_dump(mode="json"),
             provenance=manifest.provenance.model_dump(mode="json"),
-            files=_files(row),
+            files=files_of(row),
             statement=row.statement,
             signature=row.signature,
             public_key=row.public_key,
@@ -353,7 +352,7 @@ class Registry:
 
     def _manifest(self, row: Any) -> Manifest:
         if row.digest not in self._manifests:
-            content = b"".join(self._blobs.read(_files(row)[MANIFEST].sha256))
+            content = b"".join(self._blobs.read(files_of(row)[MANIFEST].sha256))
             self._manifests[row.digest] = Manifest.model_validate_json(content)
         return self._manifests[row.digest]
 
@@ -369,42 +368,6 @@ def open_registry(database: Database, blobs: Blobs, settings: Settings) -> Regis
         Problem: The signing key of the settings is not one.
     """
     return Registry(database, blobs, Signer.open(settings), settings.state / "registry")
-
-
-def _signed(
-    connection: sa.Connection, key: SigningKey, name: str, digest: str, files: Mapping[str, FileRef]
-) -> dict[str, Any]:
-    """Columns of a new version that its signature covers."""
-    last = connection.scalar(sa.select(sa.func.max(versions.c.ordinal)).where(versions.c.name == name))
-    ordinal = 0 if last is None else last + 1
-    version, created = f"1.{ordinal}.0", int(time.time())
-    text = statement(name, version, digest, iso(created), files)
-    return {
-        "name": name,
-        "version": version,
-        "ordinal": ordinal,
-        "digest": digest,
-        "files": {file: reference.model_dump() for file, reference in files.items()},
-        "statement": text,
-        "signature": key.sign(text),
-        "public_key": key.public_key,
-        "created": float(created),
-    }
-
-
-def _publication(row: Any) -> Publication:
-    return Publication(
-        name=row.name,
-        version=row.version,
-        digest=row.digest,
-        score=row.score,
-        evaluation=row.evaluation,
-        created=iso(row.created),
-    )
-
-
-def _files(row: Any) -> dict[str, FileRef]:
-    return {name: FileRef.model_validate(reference) for name, reference in row.files.items()}
 
 
 def _change(alias: str, before: str | None, after: str, why: str, who: str | None) -> MoveRecord:
