@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -106,7 +107,9 @@ def revoke(
 def rotate_signing(
     new_key: Annotated[
         Path | None,
-        typer.Option("--new-key", help="File with the new key: 32 random bytes in base64. Default: made here."),
+        typer.Option(
+            "--new-key", help="File with the new key, 32 random bytes in base64; -: stdin. Default: made here."
+        ),
     ] = None,
     is_lost: Annotated[
         bool,
@@ -121,17 +124,21 @@ def rotate_signing(
     # Imported late: `diaphane --help` needs no database.
     from services.database import open_database
     from services.registry import handovers
-    from services.registry.signing import read_seed
+    from services.registry.signing import decoded_seed, read_seed
     from services.settings import Settings
 
     if is_lost and new_key is not None:
         raise Problem("--lost takes the present key, and no --new-key.", "Put the new key in its place, then repeat.")
-    if new_key is not None and not new_key.is_file():
-        raise Problem(f"There is no file {new_key}.", "Make it: `openssl rand -base64 32 > new.key`.")
+    seed = None
+    if str(new_key) == "-":
+        seed = decoded_seed(sys.stdin.read(), "Standard input")
+    elif new_key is not None:
+        if not new_key.is_file():
+            raise Problem(f"There is no file {new_key}.", "Make it: `openssl rand -base64 32 > new.key`.")
+        seed = read_seed(new_key)
     settings = Settings(state=state)
     database = open_database(settings.database_url)
     try:
-        seed = read_seed(new_key) if new_key else None
         done = handovers.replace_lost(database, settings) if is_lost else handovers.rotate(database, settings, seed)
     finally:
         database.close()

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import base64
+import io
 import json
 import stat
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -190,5 +192,10 @@ def test_the_command_says_the_new_public_key(
         "signed": 2,
         "left": [],
     }
+    monkeypatch.setattr(sys, "stdin", io.StringIO(base64.b64encode(b"i" * 32).decode() + "\n"))
+    assert run(["keys", "rotate-signing", "--new-key", "-", *at]) == 0
+    assert site.registry.public_keys()[0] == SigningKey(b"i" * 32).public_key
+    assert run(["keys", "rotate-signing", "--new-key", "-", *at]) == ExitCode.USAGE
+    capsys.readouterr()
     assert run(["keys", "rotate-signing", "--lost", *at]) == 0
     assert "0 versions" in capsys.readouterr().err

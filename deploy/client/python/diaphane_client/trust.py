@@ -181,12 +181,17 @@ def _check_time(seen: Seen | None, pointer: Pointer, now: float) -> None:
         )
     if not 0 < pointer.expires - pointer.issued <= MAX_LIFETIME_SECONDS:
         raise Refused(f"{what} holds until {moment(pointer.expires)}, which is too long.", _ASK)
-    # A clock that was set back must not make an old statement a new one.
-    later = max(now, seen.latest if seen else now)
-    if pointer.expires + SKEW_SECONDS <= later:
+    if pointer.expires + SKEW_SECONDS <= now:
         raise Refused(
-            f"{what} expired at {moment(pointer.expires)}, and it is {moment(later)}.",
+            f"{what} expired at {moment(pointer.expires)}, and it is {moment(now)}.",
             "Set the clock of this machine; if it is right, something on the way to the server serves old answers.",
+        )
+    # A clock that was set back must not make an old statement a new one.
+    if seen and pointer.expires + SKEW_SECONDS <= seen.latest:
+        raise Refused(
+            f"{what} expired at {moment(pointer.expires)}, and one of {moment(seen.latest)} was seen here.",
+            "Set the clock of this machine; if it is right and the server's was wrong then, call "
+            f"diaphane_client.forget('{pointer.name}', folder=...).",
         )
 
 

@@ -118,12 +118,18 @@ function checkTime(seen: Seen | undefined, pointer: Pointer, now: number): void 
   if (lifetime <= 0 || lifetime > MAX_LIFETIME) {
     throw new Trouble(`${what} holds until ${moment(pointer.expires)}, which is too long.`, ASK);
   }
-  // A clock that was set back must not make an old statement a new one.
-  const later = Math.max(now, ...Object.values(seen?.marks ?? {}).map((mark) => mark.issued));
-  if (pointer.expires + SKEW <= later) {
+  if (pointer.expires + SKEW <= now) {
     throw new Trouble(
-      `${what} expired at ${moment(pointer.expires)}, and it is ${moment(later)}.`,
+      `${what} expired at ${moment(pointer.expires)}, and it is ${moment(now)}.`,
       "Set the clock of this machine; if it is right, something on the way to the server serves old answers.",
+    );
+  }
+  // A clock that was set back must not make an old statement a new one.
+  const latest = Math.max(0, ...Object.values(seen?.marks ?? {}).map((mark) => mark.issued));
+  if (pointer.expires + SKEW <= latest) {
+    throw new Trouble(
+      `${what} expired at ${moment(pointer.expires)}, and one of ${moment(latest)} was seen here.`,
+      "Set the clock of this machine; if it is right and the server's was wrong then, forget the model below.",
     );
   }
 }
