@@ -7,13 +7,14 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from support.release_server import KEY, ReleaseServer
 from support.releases import STRANGER, Record, pointer_to, publish, serve, state
 
-from diaphane_client import Denied, NotFound, Unavailable, watch
+from diaphane_client import Denied, NotFound, Unavailable, pulling, watch
 from diaphane_client import server as client_server
 
 EVERY = 0.02
@@ -129,6 +130,22 @@ def test_a_server_that_fails_lies_or_goes_away_is_asked_on_and_logged_once(
             watched.until_asked(server)
         publish(server, tmp_path, "1.3.0")
         watched.until(lambda: watched.found == ["1.1.0", "1.3.0"])
+
+
+def test_a_clock_that_is_wrong_is_said_once_though_time_goes_on(
+    server: ReleaseServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    good = publish(server, tmp_path, "1.0.0")
+    with Watched(server, tmp_path) as watched:
+        watched.until(lambda: watched.found == ["1.0.0"])
+        seconds = itertools.count(int(time.time()) + 10**6)
+        monkeypatch.setattr(pulling, "time", SimpleNamespace(time=lambda: next(seconds)))
+        for _ in range(3):
+            state(server, pointer_to(good, issued=next(seconds) - 10**6))
+            watched.until_asked(server, 4)
+        monkeypatch.undo()
+    said = [record.message for record in caplog.records if record.name.startswith("diaphane_client")]
+    assert [message.count("expired at") for message in said] == [1]
 
 
 def test_a_rollback_is_followed(server: ReleaseServer, tmp_path: Path) -> None:

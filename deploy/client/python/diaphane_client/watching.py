@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import random
+import re
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,8 @@ from typing import Final
 
 from diaphane_client.errors import PullError
 from diaphane_client.pulling import update
+
+_MOMENT: Final = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC")
 
 SPREAD: Final = 0.1
 """Waits are longer or shorter by up to this share, so that renderers that started together do not ask together."""
@@ -76,9 +79,11 @@ def watch(
             if bundle is None:
                 raise
             found, trouble = bundle, error
-        if trouble and str(trouble) != said:
+        # Times in it go on, where a clock is wrong at every question: that is no news.
+        matter = _MOMENT.sub("", str(trouble or ""))
+        if trouble and matter != said:
             log.warning("'%s' %s stays as it is, %s: %s", name, alias, found.name, trouble)
-        said = str(trouble or "")
+        said = matter
         if found != bundle:
             bundle = found
             yield found
