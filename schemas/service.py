@@ -237,6 +237,35 @@ class VersionRecord(_Record):
     job_id: str | None = None
 
 
+class HandoverRecord(_Record):
+    """A signing key names the one that follows it.
+
+    Attributes:
+        statement: The exact text that is signed: canonical JSON with both public keys and the time.
+        signature: ed25519 of the old key over the statement's UTF-8 bytes, base64.
+    """
+
+    statement: str
+    signature: str
+
+
+class PointerRecord(_Record):
+    """What an alias means now, for clients to believe until it expires.
+
+    Attributes:
+        statement: The exact text that is signed: canonical JSON with name, selector, version, digest, serial, and when
+            it was issued and expires, in seconds since 1970. The serial rises with each move of the alias.
+        signature: ed25519 over the statement's UTF-8 bytes, base64.
+        public_key: Raw ed25519 public key, base64.
+        handovers: How this key followed earlier ones, oldest first.
+    """
+
+    statement: str
+    signature: str
+    public_key: str
+    handovers: tuple[HandoverRecord, ...] = ()
+
+
 class MoveRecord(_Record):
     """One move of an alias: from which version to which, when, by whom and why."""
 

@@ -20,7 +20,8 @@ class Settings(BaseSettings):
             whoever can write to the database can run code on the workers.
         store: Folder, or `s3://bucket/prefix` (credentials and endpoint as usual in `AWS_*`); empty: `state`/store.
         cache: Local copies of what lies in an object store; empty: `state`/cache.
-        signing_key: ed25519 seed, base64, that versions are signed with; empty: made once and kept in `state`.
+        signing_key: ed25519 seed, base64, that versions and what aliases mean are signed with; empty: made once and
+            kept in `state`.
         heartbeat: Seconds between two heartbeats of a process.
         ttl: Seconds of silence after which a process is taken for dead.
         poll: Seconds between two looks into a queue.

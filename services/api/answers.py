@@ -134,7 +134,7 @@ class Workers(_Model):
 
 
 class SigningKeys(_Model):
-    """Raw ed25519 public keys, base64, that versions are signed with."""
+    """Raw ed25519 public keys, base64: the one that versions and aliases are signed with, then those before it."""
 
     keys: list[str]
 

@@ -87,4 +87,5 @@ def _answer(request: Request, name: str, headers: dict[str, str]) -> Response:
 
 router.add_api_route("/models", models.list_models)
 router.add_api_route("/models/{name}/versions/{version}", models.read_version, response_model=None)
+router.add_api_route("/models/{name}/pointers/{version}", models.read_pointer)
 router.add_api_route("/blobs/sha256/{sha256}", blobs.read_blob, response_class=Response)

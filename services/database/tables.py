@@ -160,7 +160,7 @@ versions = _table(
     sa.UniqueConstraint("name", "digest"),
     sa.UniqueConstraint("name", "ordinal"),
 )
-"""Published versions; a row never changes."""
+"""Published versions; a row never changes, but for its signature when the signing key does."""
 
 aliases = _table(
     "aliases",
@@ -182,6 +182,17 @@ moves = _table(
     sa.Column("why", sa.Text, nullable=False),
 )
 """Every move of every alias."""
+
+handovers = _table(
+    "handovers",
+    sa.Column("id", sa.Integer, primary_key=True, autoincrement=True),
+    sa.Column("old_key", sa.Text, nullable=False),
+    sa.Column("new_key", sa.Text, nullable=False),
+    sa.Column("statement", sa.Text),
+    sa.Column("signature", sa.Text),
+    sa.Column("at", sa.Double, nullable=False),
+)
+"""Every change of the signing key; without a statement where the old key was lost."""
 
 measurements = _table(
     "measurements",
