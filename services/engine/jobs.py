@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
-from schemas.job import JobKind, JobSpec, JobState, TaskState
+from schemas.job import FINAL_STATES, JobKind, JobSpec, JobState, TaskState
 from schemas.pixel_weights import DEFAULT_WEIGHTS
 from schemas.problem import ExitCode, Problem
 from schemas.service import EventRecord, ExecutorRecord, JobRecord, QueueRecord, TaskRecord
 from services.acceptance import Accepted
 from services.clock import iso
 from services.database import Database, tables
+from services.database.clock import clock
 from services.engine import events, progress, queues, states, system
 from services.engine.events import Event
-from services.engine.liveness import clock
 from services.settings import Settings
 from services.store import canonical_json
 from services.tasks import ROLES
@@ -166,6 +166,12 @@ class Jobs:
         with self._database.read() as connection:
             rows = connection.execute(query.order_by(table.c.created.desc(), table.c.id.desc()).limit(limit)).all()
             return self._records(connection, rows)
+
+    def unfinished(self, submitted_by: str) -> int:
+        """How many jobs of a key have not ended."""
+        mine = sa.and_(tables.jobs.c.submitted_by == submitted_by, tables.jobs.c.state.not_in(FINAL_STATES))
+        with self._database.read() as connection:
+            return int(connection.scalar(sa.select(sa.func.count()).where(mine)) or 0)
 
     def cancel(self, job_id: str) -> JobRecord:
         """Ends a job; one that has ended stays as it is.
