@@ -147,7 +147,7 @@ def test_a_rejected_scene_ends_with_the_reason(
     assert run(["scenes", "upload", "glass.usdz"]) == ExitCode.CHECK_FAILED
     captured = capsys.readouterr()
     assert "rejected" in captured.out
-    assert "The server rejects glass.usdz: It is [2J no scene.\nExport it again." in captured.err
+    assert "The server rejects glass.usdz: It is\\x1b[2J no scene.\nExport it again." in captured.err
 
 
 @pytest.mark.parametrize(
@@ -389,7 +389,7 @@ def test_watching_ends_as_the_job_does(
     assert submit(server, "--watch") == status
     captured = capsys.readouterr()
     assert "render: 4/4 (1 skipped)" in captured.err
-    assert "Rendering.  Still." in captured.err
+    assert "Rendering. \\u2028Still." in captured.err
     assert captured.err.count("Rendering.") == 1
     assert str(outcome["state"]) in captured.out
     if status is ExitCode.CHECK_FAILED:

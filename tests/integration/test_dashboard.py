@@ -627,6 +627,16 @@ def test_streams_tell_of_changes(api: Api, shown: Shown) -> None:
     assert watch._look() != before
 
 
+def test_signs_that_hide_others_are_written_out_on_every_page(tmp_path: Path) -> None:
+    """`gpj.exe` after U+202E reads as a picture."""
+    api = Api(tmp_path, rate=1e6, burst=10**6)
+    shown = fill(api, tmp_path, "bottle\u202egpj.exe \u2066\u200b\x9b")
+    admin = Visitor(api)
+    texts = [admin.get(path).text for path in _pages(shown)]
+    assert not any(sign in text for text in texts for sign in "\u202e\u2066\u200b\x9b")
+    assert sum("bottle\\u202egpj.exe \\u2066\\u200b\\x9b" in text for text in texts) >= 3
+
+
 def test_durations_and_addresses() -> None:
     assert [duration(s) for s in (None, -1.0, 0.4, 61.0, 3600.0, 90061.0)] == [
         *("–", "0 s", "0 s", "1 min 1 s", "1 h", "1 d 1 h")
