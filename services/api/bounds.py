@@ -11,7 +11,6 @@ from schemas.job import JobSpec
 from schemas.service import KeyRecord, SceneRecord
 from services.keys import allows
 from services.problems import Refusal
-from services.service import Service
 from services.settings import Settings
 
 USUAL_STEPS = 10_000
@@ -43,16 +42,9 @@ def require_within(spec: JobSpec, scenes: Mapping[str, SceneRecord], key: KeyRec
             raise Refusal("too-large", f"The job has {steps} steps; the key may ask for {most}.", _REMEDY)
 
 
-def require_place(service: Service, key: KeyRecord) -> None:
-    """Refuses one more job of a key that has too many under way: those of a key take turns with those of others.
-
-    Raises:
-        Refusal: It has.
-    """
-    most = _bound(key, key.bounds.jobs, service.settings.jobs)
-    if most is not None and service.jobs.unfinished(key.id) >= most:
-        detail = f"The key has {most} jobs that have not ended, as many as it may."
-        raise Refusal("too-large", detail, "Wait until some have ended, or cancel them.")
+def most_jobs(key: KeyRecord, settings: Settings) -> int | None:
+    """How many jobs of a key may not have ended: those of a key take turns with those of others. None: any number."""
+    return _bound(key, key.bounds.jobs, settings.jobs)
 
 
 def pixels_of(spec: JobSpec, scenes: Mapping[str, SceneRecord]) -> int:

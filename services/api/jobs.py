@@ -13,7 +13,7 @@ from schemas.service import JobRecord, KeyRecord, SceneRecord, TaskRecord
 from services.acceptance import accept
 from services.api.answers import EventPage, JobPage, TaskPage
 from services.api.body import JsonBody
-from services.api.bounds import require_place, require_within
+from services.api.bounds import most_jobs, require_within
 from services.api.feeds import Feeds
 from services.api.pages import LINK_HEADER, MOMENT, TASK_PLACE, Page
 from services.api.parts import JobId, NameQuery, Services
@@ -61,8 +61,8 @@ def submit_job(
     named: dict[str, Any] = {"submitted_by": caller.id, "idempotency_key": idempotency_key}
     record, new = service.jobs.repeated(spec, **named), False
     if record is None:
-        require_place(service, caller)
         accepted = accept(spec, scenes, service.registry, service.measured, service.storage.store)
+        named["most"] = most_jobs(caller, service.settings)
         record, new = service.jobs.submit(spec, **named, request_id=request.state.request_id, accepted=accepted)
     response.headers["Location"] = f"/v1/jobs/{record.id}"
     response.status_code = 202 if new else 200
@@ -115,8 +115,7 @@ def cancel_job(job_id: JobId, service: Services, caller: Caller) -> JobRecord:
 def retry_job(job_id: JobId, service: Services, caller: Caller) -> JobRecord:
     """Goes on with a failed or cancelled job of the same key, or with `admin` any; what was made is found again."""
     require_own_job(service, caller, job_id)
-    require_place(service, caller)
-    return service.jobs.retry(job_id)
+    return service.jobs.retry(job_id, most=most_jobs(caller, service.settings))
 
 
 @router.get("/{job_id}/tasks", responses={200: {"headers": LINK_HEADER}})
@@ -181,7 +180,6 @@ async def stream_events(request: Request, job_id: str, after: int) -> Response:
 
     Raises:
         Problem: There is no such job.
-        Refusal: Too many listen already.
     """
     feeds: Feeds = request.app.state.feeds
     state = await to_thread.run_sync(feeds.state, job_id)
@@ -190,7 +188,6 @@ async def stream_events(request: Request, job_id: str, after: int) -> Response:
     last, final = state
     if final and after >= last:
         return Response(status_code=204)  # to a browser this says that it need not connect again
-    request.app.state.leases.require_room(request.state.holder)
     return EventStream(feeds.listen(job_id, after, state))
 
 

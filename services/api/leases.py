@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import anyio
 import structlog
 from anyio import to_thread
-from sqlalchemy.exc import SQLAlchemyError
 from starlette.types import Scope
 
 from services.problems import Refusal
@@ -81,8 +80,9 @@ class Leases:
         """How many listen now."""
         return self._listeners.total()
 
-    def require_room(self, holder: Holder) -> None:
-        """Refuses one more listener.
+    @contextmanager
+    def listen(self, holder: Holder) -> Iterator[None]:
+        """While somebody listens; taken before the answer begins, so that of many at once none is too many.
 
         Raises:
             Refusal: Too many listen already, in all or with this key.
@@ -92,6 +92,13 @@ class Leases:
             raise Refusal("too-many-requests", detail, "End some of them, then try again.", headers=_LATER)
         if self.listeners >= LISTENERS:
             raise Refusal("unavailable", f"{LISTENERS} listeners are connected already.")
+        self._listeners[holder.key_id] += 1
+        try:
+            yield
+        finally:
+            self._listeners[holder.key_id] -= 1
+            if not self._listeners[holder.key_id]:
+                del self._listeners[holder.key_id]
 
     @contextmanager
     def hold(self, holder: Holder, end: Callable[[], None], *, ends_in_doubt: bool = False) -> Iterator[None]:
@@ -110,17 +117,6 @@ class Leases:
         finally:
             self._held.discard(lease)
 
-    @contextmanager
-    def listen(self, holder: Holder) -> Iterator[None]:
-        """While somebody listens; see `require_room`."""
-        self._listeners[holder.key_id] += 1
-        try:
-            yield
-        finally:
-            self._listeners[holder.key_id] -= 1
-            if not self._listeners[holder.key_id]:
-                del self._listeners[holder.key_id]
-
     def _watch(self) -> None:
         loop, watcher = asyncio.get_running_loop(), self._watcher
         if watcher is None or watcher.done() or watcher.get_loop() is not loop:
@@ -134,7 +130,7 @@ class Leases:
             ended: set[Holder] | None
             try:
                 ended = await to_thread.run_sync(self._ended, holders, limiter=self._thread)
-            except SQLAlchemyError as error:
+            except Exception as error:  # whatever it is, the next look must come
                 log.warning("keys cannot be read", error=type(error).__name__)
                 ended = None
             for lease in list(self._held):

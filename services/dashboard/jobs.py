@@ -9,7 +9,7 @@ from fastapi import APIRouter, Depends, Header, Query, Request, Response
 
 from schemas.job import FINAL_STATES, JobKind, JobState, TaskState
 from schemas.service import EventRecord
-from services.api.bounds import require_place
+from services.api.bounds import most_jobs
 from services.api.jobs import last_number, require_own_job, stream_events
 from services.api.pages import MOMENT, TASK_PLACE, Page
 from services.api.parts import JobId, Services
@@ -148,8 +148,7 @@ def cancel_job(job_id: JobId, service: Services, caller: Caller, _: _Button) -> 
 def retry_job(job_id: JobId, service: Services, caller: Caller, _: _Button) -> Response:
     """Goes on with a failed or cancelled job."""
     require_own_job(service, caller, job_id)
-    require_place(service, caller)
-    return redirect(f"/jobs/{service.jobs.retry(job_id).id}")
+    return redirect(f"/jobs/{service.jobs.retry(job_id, most=most_jobs(caller, service.settings)).id}")
 
 
 def _log(service: Service, job_id: str, until: int) -> list[Line]:

@@ -11,6 +11,7 @@ import sqlalchemy as sa
 from dbos import DBOS, DBOSConfig, DBOSPortableJSONSerializer
 
 from services.database import Database, open_database, tables
+from services.database.clock import clock
 from services.engine import flow, queues, system
 from services.engine.claims import Claims
 from services.engine.jobs import Jobs

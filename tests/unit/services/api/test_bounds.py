@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +107,18 @@ def test_a_key_has_so_many_jobs_under_way(api: Api) -> None:
     api.move(jobs[0], "failed")
     assert _submit(api, headers).status_code == 202
     assert api.post(f"/v1/jobs/{jobs[0]}/retry", None, headers=headers).status_code == 413
+
+
+def test_of_many_jobs_at_once_no_more_are_taken(database_url: str, tmp_path: Path) -> None:
+    api = Api(tmp_path, database_url, jobs=2)
+    spec, headers = build_spec(api.scene()), _key(api, "submit")
+
+    def submit(_: int) -> int:
+        return int(api.post("/v1/jobs", None, headers=headers, json=spec).status_code)
+
+    with ThreadPoolExecutor(8) as pool:
+        statuses = list(pool.map(submit, range(8)))
+    assert sorted(statuses) == [202] * 2 + [413] * 6
 
 
 def test_a_request_that_is_repeated_is_answered_however_many_jobs_there_are(api: Api) -> None:

@@ -40,8 +40,9 @@ def _stream(url: str, path: str, headers: dict[str, str]) -> Iterator[Iterator[s
 
 def _ends(lines: Iterator[str]) -> float:
     """When a stream ends, properly: a connection that breaks off is an error."""
+    end = time.monotonic() + 10.0
     for _ in lines:
-        pass
+        assert time.monotonic() < end
     return time.monotonic()
 
 
@@ -175,6 +176,31 @@ def test_one_key_leaves_room_for_others_to_listen(api: Api, monkeypatch: pytest.
         _until_listeners(api, 0)
         with _stream(url, path, own) as lines:
             next(lines)
+
+
+def test_of_many_listeners_at_once_no_more_are_let_in(api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each of them finds room, if it looks before the others have sat down."""
+    monkeypatch.setattr(module, "LISTENERS_PER_KEY", 3)
+    path, headers = f"/v1/jobs/{api.job()}/events", {**STREAM, **api.headers("read")}
+    statuses: list[int] = []
+    done = threading.Event()
+
+    def listen() -> None:
+        with httpx.Client(timeout=20.0) as client, client.stream("GET", f"{url}{path}", headers=headers) as answer:
+            statuses.append(answer.status_code)
+            done.wait(20.0)
+
+    with api.served() as url:
+        threads = [threading.Thread(target=listen) for _ in range(12)]
+        for thread in threads:
+            thread.start()
+        end = time.monotonic() + 15.0
+        while len(statuses) < 12 and time.monotonic() < end:
+            time.sleep(0.02)
+        done.set()
+        for thread in threads:
+            thread.join()
+    assert sorted(statuses) == [200] * 3 + [429] * 9
 
 
 def test_all_keys_together_leave_the_server_standing(api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
