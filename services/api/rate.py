@@ -77,7 +77,8 @@ class Buckets:
             allowed = level >= tokens
             if allowed:
                 level -= tokens
-                self._taken[name] = self._taken.get(name, 0.0) + tokens
+                if self._ledger is not None:
+                    self._taken[name] = self._taken.get(name, 0.0) + tokens
             self._levels[name] = (level, now)
             self._levels.move_to_end(name)
             if len(self._levels) > _KEPT:

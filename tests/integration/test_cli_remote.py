@@ -241,11 +241,14 @@ def test_what_must_not_happen_twice_is_not_repeated(server: FakeServer) -> None:
         (401, "unauthenticated", ExitCode.AUTH),
         (403, "forbidden", ExitCode.AUTH),
         (404, "not-found", ExitCode.NOT_FOUND),
+        (408, "too-slow", ExitCode.TRY_AGAIN),
         (409, "conflict", ExitCode.CONFLICT),
         (413, "too-large", ExitCode.LIMIT),
+        (431, "headers-too-large", ExitCode.LIMIT),
         (422, "invalid", ExitCode.USAGE),
         (422, "check-failed", ExitCode.CHECK_FAILED),
         (500, "internal", ExitCode.CHECK_FAILED),
+        (507, "storage-full", ExitCode.TRY_AGAIN),
     ],
 )
 def test_problems_of_the_server_end_with_their_status(
