@@ -33,6 +33,18 @@ class Limits:
     """Optimiser steps of a training."""
     body_bytes: int = 1 << 20
     """Bytes of a JSON request body."""
+    head_bytes: int = 32 << 10
+    """Bytes of the head of a request: line and headers; also of trailers, and whatever else is no body."""
+    headers: int = 100
+    """Headers of a request, trailers included."""
+    head_seconds: float = 15.0
+    """From the first byte of a connection or a request until its head is there."""
+    body_stall_seconds: float = 15.0
+    """Between two pieces of a body."""
+    body_rate: int = 16 << 10
+    """Bytes a second that a body arrives at, on average, after `body_stall_seconds`."""
+    send_stall_seconds: float = 60.0
+    """In which a client takes some of its answer."""
     json_depth: int = 16
     """Nesting of a JSON request body."""
     upload_bytes: int = 2 << 30

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from schemas.job import JobKind, JobSpec, JobState, Priority, TaskState
+from schemas.limits import LIMITS
 from schemas.measurement import Measurement
 
 Scope = Literal["read", "submit", "publish", "admin"]
@@ -297,6 +298,20 @@ class MeasurementRecord(_Record):
     measurement: Measurement
 
 
+class JobBounds(_Record):
+    """What the jobs of a key may ask for; None is what the service is configured for (`DIAPHANE_JOB_*`).
+
+    Attributes:
+        job_pixels: Pixels of all views of a job together.
+        job_steps: Optimiser steps of a job.
+        jobs: Jobs that have not ended.
+    """
+
+    job_pixels: int | None = Field(default=None, ge=1, le=2**53)
+    job_steps: int | None = Field(default=None, ge=1, le=LIMITS.steps)
+    jobs: int | None = Field(default=None, ge=1, le=2**31 - 1)
+
+
 class KeyRecord(_Record):
     """An API key without its secret."""
 
@@ -307,6 +322,7 @@ class KeyRecord(_Record):
     expires: str | None = None
     revoked: str | None = None
     last_used: str | None = None
+    bounds: JobBounds = JobBounds()
 
 
 class QueueRecord(_Record):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import ipaddress
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from schemas.problem import Problem
@@ -40,8 +41,13 @@ class Settings(BaseSettings):
         keep_days: Artifacts, jobs and events unused for longer are removed; 0: kept.
         keep_bytes: Beyond this the least recently used artifacts are removed; 0: no bound.
         hosts: Names, separated by commas, that the API answers for beside those of the loopback interface; `*`: any.
+        proxies: Addresses and networks, separated by commas, of the proxies in front whose `X-Forwarded-For` and
+            `X-Forwarded-Proto` are believed; empty: nobody's.
         rate: Requests a second that a key may make, on average.
         burst: Requests that it may make at once.
+        job_pixels: Pixels of all views of a job, where its key has no bound of its own; keys with `admin` have none.
+        job_steps: Optimiser steps of a job; the same.
+        jobs: Jobs of a key that have not ended; the same.
     """
 
     model_config = SettingsConfigDict(env_prefix="DIAPHANE_", frozen=True, extra="ignore")
@@ -70,6 +76,10 @@ class Settings(BaseSettings):
     hosts: str = ""
     rate: float = Field(default=50.0, gt=0.0)
     burst: int = Field(default=200, ge=1)
+    proxies: str = ""
+    job_pixels: int = Field(default=10**10, ge=1)
+    job_steps: int = Field(default=100_000, ge=1)
+    jobs: int = Field(default=100, ge=1)
 
     def __init__(self, **values: Any) -> None:
         try:
@@ -88,6 +98,18 @@ class Settings(BaseSettings):
             raise ValueError("DIAPHANE_TTL has to be at least three times DIAPHANE_HEARTBEAT")
         return self
 
+    @field_validator("proxies")
+    @classmethod
+    def _are_addresses(cls, text: str) -> str:
+        for part in _parts(text):
+            ipaddress.ip_network(part)
+        return text
+
+    @property
+    def trusted_proxies(self) -> tuple[str, ...]:
+        """`proxies`, one by one."""
+        return _parts(self.proxies)
+
     @property
     def database_url(self) -> str:
         """`database`, or SQLite in the state folder."""
@@ -102,3 +124,7 @@ class Settings(BaseSettings):
     def cache_folder(self) -> Path:
         """Where local copies of an object store's content lie."""
         return Path(self.cache) if self.cache else self.state.resolve() / "cache"
+
+
+def _parts(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(",") if part.strip())

@@ -38,6 +38,15 @@ def create(
     name: Annotated[str, typer.Argument(help="Who or what it is for.")],
     scope: Annotated[list[str], typer.Option("--scope", help="read, submit, publish or admin; repeatable.")],
     days: Annotated[float | None, typer.Option("--days", help="Days until it expires. Default: never.")] = None,
+    job_pixels: Annotated[
+        int | None, typer.Option("--job-pixels", min=1, help="Pixels of all views of a job. Default: the service's.")
+    ] = None,
+    job_steps: Annotated[
+        int | None, typer.Option("--job-steps", min=1, help="Optimiser steps of a job. Default: the service's.")
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", min=1, help="Jobs that have not ended. Default: the service's.")
+    ] = None,
     is_local: LocalOption = False,
     state: StateOption = DEFAULT_STATE,
     url: UrlOption = DEFAULT_URL,
@@ -51,13 +60,16 @@ def create(
     if days is not None and not 0.0 < days <= 36500.0:
         raise Problem(f"--days {days:g} is not above 0 and at most 36500.", "Change that option.")
     expires = None if days is None else time.time() + days * _DAY_SECONDS
+    bounds = {"job_pixels": job_pixels, "job_steps": job_steps, "jobs": jobs}
     if is_local:
+        from schemas.service import JobBounds
+
         with _local(state) as keys:
-            record, secret = keys.create(name, scope, expires)  # type: ignore[arg-type]  # checked above
+            record, secret = keys.create(name, scope, expires, JobBounds(**bounds))  # type: ignore[arg-type]  # checked
         made: dict[str, Any] = {"key": record.model_dump(mode="json"), "secret": secret}
     else:
         moment = None if expires is None else datetime.fromtimestamp(expires, UTC).isoformat(timespec="seconds")
-        made = connect(url, key_file).create_key(name, scope, moment)
+        made = connect(url, key_file).create_key(name, scope, moment, bounds)
     if as_json:
         output.print_json(made)
         return

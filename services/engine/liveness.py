@@ -28,6 +28,7 @@ import structlog
 from sqlalchemy.exc import DBAPIError
 
 from services.database import Database, tables
+from services.database.clock import clock
 from services.engine import system
 from services.engine.claims import Claims
 from services.settings import Settings
@@ -55,13 +56,6 @@ def process_start(pid: int) -> str | None:
     except OSError:
         return None
     return None if fields[0] in ("Z", "X") else fields[19]
-
-
-def clock(database: Database) -> sa.ColumnElement[float]:
-    """The database's clock, seconds since 1970."""
-    if database.is_postgresql:
-        return sa.literal_column("extract(epoch from clock_timestamp())::double precision")
-    return sa.literal_column("((julianday('now') - 2440587.5) * 86400.0)")
 
 
 class Liveness:
