@@ -23,7 +23,7 @@ from renderer.gate.gltf import GlbContent, Object, damaged, floats, read_glb, wa
 from renderer.gate.images import PNG
 from schemas.scene import Wrap
 
-VERSION = "1"
+VERSION = "2"
 """Changes whenever the same file is converted to something else."""
 TRIANGLES, STRIP, FAN = 4, 5, 6
 WRAPS: dict[int, Wrap] = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
@@ -66,6 +66,17 @@ def stage_file(folder: Path, root: str, cache: Path) -> Path:
     return stage
 
 
+def _write_node(world: Sdf.PrimSpec, name: str, matrix: NDArray[np.float64], mesh: Sdf.Path) -> None:
+    """A place of a mesh; the matrix [4, 4] acts on columns, USD's on rows."""
+    node = Sdf.PrimSpec(world, name, Sdf.SpecifierDef, "Xform")
+    transform = Sdf.AttributeSpec(node, "xformOp:transform", Sdf.ValueTypeNames.Matrix4d)
+    transform.default = Gf.Matrix4d(*matrix.T.ravel().tolist())
+    order = Sdf.AttributeSpec(node, UsdGeom.Tokens.xformOpOrder, Sdf.ValueTypeNames.TokenArray, Sdf.VariabilityUniform)
+    order.default = ["xformOp:transform"]
+    node.referenceList.Prepend(Sdf.Reference("", mesh))
+    node.instanceable = True
+
+
 class _Converter:
     def __init__(self, content: GlbContent, folder: Path) -> None:
         self._content = content
@@ -79,14 +90,15 @@ class _Converter:
         UsdGeom.SetStageUpAxis(self._stage, UsdGeom.Tokens.y)
         UsdGeom.SetStageMetersPerUnit(self._stage, 1.0)
         self._stage.SetDefaultPrim(UsdGeom.Xform.Define(self._stage, "/World").GetPrim())
-        for number, (node, matrix) in enumerate(walk_nodes(self._content)):
-            if "mesh" in node:
-                xform = UsdGeom.Xform.Define(self._stage, f"/World/Node{number}")
-                # USD's matrices act on rows.
-                xform.AddTransformOp().Set(Gf.Matrix4d(*matrix.T.ravel().tolist()))
-                xform.GetPrim().GetReferences().AddInternalReference(self._mesh(node["mesh"]))
-                xform.GetPrim().SetInstanceable(True)
-        self._stage.GetRootLayer().Export(str(file))
+        nodes = enumerate(walk_nodes(self._content))
+        placed = [(number, matrix, self._mesh(node["mesh"])) for number, (node, matrix) in nodes if "mesh" in node]
+        # On a stage every node would be composed as it is written, each time with all that came before it.
+        layer = Sdf.Layer.CreateAnonymous(".usdc")
+        layer.TransferContent(self._stage.GetRootLayer())
+        with Sdf.ChangeBlock():
+            for number, matrix, mesh in placed:
+                _write_node(layer.GetPrimAtPath("/World"), f"Node{number}", matrix, mesh)
+        layer.Export(str(file))
 
     def _mesh(self, index: int) -> Sdf.Path:
         """Where a mesh is written, once for all nodes that show it."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Tf, Usd, UsdGeom
+from pxr import Ar, Sdf, Tf, Usd, UsdGeom
 
 from renderer.usd.assemble import Placed, assemble
 from renderer.usd.bindings import bindings
@@ -20,7 +20,15 @@ from renderer.usd.instances import Draw, Walker, product
 from renderer.usd.materials import MaterialTable
 from renderer.usd.parts import Part, build_parts
 from renderer.usd.shape import Reading
-from renderer.usd.stage import WarningLog, canonical_path, open_stage, stage_time, usd_diagnostics, usd_reason
+from renderer.usd.stage import (
+    WarningLog,
+    canonical_path,
+    open_stage,
+    stage_time,
+    usd_diagnostics,
+    usd_reason,
+    used_layers,
+)
 from renderer.usd.textures import TextureTable
 from schemas.problem import ExitCode, Problem
 from schemas.scene import SceneArrays
@@ -54,12 +62,14 @@ class LoadOptions:
         variants: Selections `set=choice` (every prim that has the set) or `/prim/path:set=choice`.
         refine: Levels of subdivision of meshes that have a scheme, 0 to MAX_REFINE; 0: their cages, as `usdrecord
             --complexity low`.
+        home: Folder that everything which the stage opens has to lie in, for scenes of strangers; None: anywhere.
     """
 
     alpha: float | None = None
     time: float | None = None
     variants: tuple[str, ...] = ()
     refine: int = 0
+    home: Path | None = None
 
     def __post_init__(self) -> None:
         if self.alpha is not None and not 0.0 < self.alpha <= 1.0:
@@ -77,7 +87,7 @@ def load_scene(path: Path, options: LoadOptions = LoadOptions(), watch: Watch | 
 
     Args:
         path: A .usd, .usda, .usdc or .usdz file.
-        options: Alpha, time and variants.
+        options: Alpha, time, variants, and where its files may lie.
         watch: For reports of what was found.
 
     Raises:
@@ -87,13 +97,21 @@ def load_scene(path: Path, options: LoadOptions = LoadOptions(), watch: Watch | 
     try:
         with usd_diagnostics(log):
             stage = open_stage(path, options.variants)
-            scene = _StageReader(stage, path, options, log, watch).read()
+            # Whatever is looked up while it is read is looked up as the stage does it.
+            with Ar.ResolverContextBinder(stage.GetPathResolverContext()):
+                scene = _StageReader(stage, path, options, log, watch).read()
+            used_layers(stage, options.home and options.home.resolve())
     except (Tf.ErrorException, UnicodeDecodeError) as error:
         # Also a damaged file's strings can have bytes that are no text.
         raise Problem(
             f"{path} cannot be read as USD: {usd_reason(error)}.", "Check it with usdchecker.", ExitCode.USAGE
         ) from error
-    return replace(scene, warnings=log.lines())
+    return replace(scene, warnings=tuple(_named_from(options.home, line) for line in log.lines()))
+
+
+def _named_from(home: Path | None, line: str) -> str:
+    """A warning with names of files as they are in a folder, wherever that lies today."""
+    return line if home is None else line.replace(f"{home}/", "").replace(f"{home.resolve()}/", "")
 
 
 class _StageReader:
@@ -109,7 +127,7 @@ class _StageReader:
         self._watch = watch
         self._refine = options.refine
         self._time = stage_time(stage, options.time)
-        self._textures = TextureTable()
+        self._textures = TextureTable(options.home and options.home.resolve())
         self._materials = MaterialTable(self._time, self._textures, log)
         self._metres = metres_per_unit(stage, log)
 

@@ -38,6 +38,12 @@ OWN_CHAMPION: Final = "champion"
 _STRICT = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
+class SceneView(ListedView):
+    """A camera of a job: what nobody knows here would be left out without a word, and is refused."""
+
+    model_config = _STRICT
+
+
 class SceneUse(BaseModel):
     """A scene of a job.
 
@@ -51,7 +57,7 @@ class SceneUse(BaseModel):
 
     scene: SceneId
     holdout: bool = False
-    views: tuple[ListedView, ...] = Field(default=(), max_length=LIMITS.views)
+    views: tuple[SceneView, ...] = Field(default=(), max_length=LIMITS.views)
 
     @model_validator(mode="after")
     def _have_directions(self) -> Self:

@@ -33,6 +33,18 @@ class Limits:
     """Optimiser steps of a training."""
     body_bytes: int = 1 << 20
     """Bytes of a JSON request body."""
+    head_bytes: int = 32 << 10
+    """Bytes of the head of a request: line and headers; also of trailers, and whatever else is no body."""
+    headers: int = 100
+    """Headers of a request, trailers included."""
+    head_seconds: float = 15.0
+    """From the first byte of a connection or a request until its head is there."""
+    body_stall_seconds: float = 15.0
+    """Between two pieces of a body."""
+    body_rate: int = 16 << 10
+    """Bytes a second that a body arrives at, on average, after `body_stall_seconds`."""
+    send_stall_seconds: float = 60.0
+    """In which a client takes some of its answer."""
     json_depth: int = 16
     """Nesting of a JSON request body."""
     upload_bytes: int = 2 << 30
@@ -49,6 +61,10 @@ class Limits:
     """Composed prims of an uploaded scene, instance proxies included."""
     points: int = 100_000_000
     """Points of an uploaded scene over all meshes, instances included."""
+    triangles: int = 60_000_000
+    """Triangles of a scene, instances included: about 3.5 GB of arrays when every corner is its own vertex."""
+    clip_steps: int = 100_000
+    """Steps of the value clips of an uploaded scene: a file is looked for at each."""
     texture_pixels: int = 16384 * 16384
     """Pixels of one texture of an uploaded scene."""
     compression_ratio: int = 200

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from schemas.job import JobKind, JobSpec, JobState, Priority, TaskState
+from schemas.limits import LIMITS
 from schemas.measurement import Measurement
 
 Scope = Literal["read", "submit", "publish", "admin"]
@@ -237,6 +238,35 @@ class VersionRecord(_Record):
     job_id: str | None = None
 
 
+class HandoverRecord(_Record):
+    """A signing key names the one that follows it.
+
+    Attributes:
+        statement: The exact text that is signed: canonical JSON with both public keys and the time.
+        signature: ed25519 of the old key over the statement's UTF-8 bytes, base64.
+    """
+
+    statement: str
+    signature: str
+
+
+class PointerRecord(_Record):
+    """What an alias means now, for clients to believe until it expires.
+
+    Attributes:
+        statement: The exact text that is signed: canonical JSON with name, selector, version, digest, serial, and when
+            it was issued and expires, in seconds since 1970. The serial rises with each move of the alias.
+        signature: ed25519 over the statement's UTF-8 bytes, base64.
+        public_key: Raw ed25519 public key, base64.
+        handovers: How this key followed earlier ones, oldest first.
+    """
+
+    statement: str
+    signature: str
+    public_key: str
+    handovers: tuple[HandoverRecord, ...] = ()
+
+
 class MoveRecord(_Record):
     """One move of an alias: from which version to which, when, by whom and why."""
 
@@ -268,6 +298,20 @@ class MeasurementRecord(_Record):
     measurement: Measurement
 
 
+class JobBounds(_Record):
+    """What the jobs of a key may ask for; None is what the service is configured for (`DIAPHANE_JOB_*`).
+
+    Attributes:
+        job_pixels: Pixels of all views of a job together.
+        job_steps: Optimiser steps of a job.
+        jobs: Jobs that have not ended.
+    """
+
+    job_pixels: int | None = Field(default=None, ge=1, le=2**53)
+    job_steps: int | None = Field(default=None, ge=1, le=LIMITS.steps)
+    jobs: int | None = Field(default=None, ge=1, le=2**31 - 1)
+
+
 class KeyRecord(_Record):
     """An API key without its secret."""
 
@@ -278,10 +322,11 @@ class KeyRecord(_Record):
     expires: str | None = None
     revoked: str | None = None
     last_used: str | None = None
+    bounds: JobBounds = JobBounds()
 
 
 class QueueRecord(_Record):
-    """How much waits for a role."""
+    """How much waits for a role, or, as `check`, how many uploads wait for their check."""
 
     role: str
     queued: int

@@ -8,14 +8,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pxr import Ar, Sdf, Tf, Usd, UsdGeom
 
 from renderer.convert import stage_file
 from renderer.gate import RejectedScene
 from renderer.gate.check import CheckedUpload, check_upload
 from renderer.gate.problems import shown
-from renderer.scene import load_scene
-from renderer.usd.stage import WarningLog, open_stage, stage_time, usd_diagnostics
+from renderer.scene import LoadOptions, load_scene
+from renderer.usd.stage import OutsideHome, WarningLog, open_stage, stage_time, usd_diagnostics, used_layers
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 
@@ -24,7 +25,10 @@ WARNINGS = 50
 WARNING_LENGTH = 200
 """Most characters of one."""
 GPRIM_POINTS = 600
-"""About as many points as an implicit gprim is tessellated to."""
+"""About as many points as an implicit gprim is tessellated to; twice as many triangles."""
+
+Size = tuple[int, int]
+"""Points and triangles."""
 
 
 def inspect(folder: Path, root: str, cache: Path | None = None) -> dict[str, Any]:
@@ -49,11 +53,13 @@ def inspect(folder: Path, root: str, cache: Path | None = None) -> dict[str, Any
         stage_path = stage_file(folder, root, cache or Path(tempfile.gettempdir()))
         home = folder if stage_path.is_relative_to(folder) else stage_path.parent
         counts = _count(stage_path, home, root)
-        scene = load_scene(stage_path)
+        scene = load_scene(stage_path, LoadOptions(home=home))
     except RejectedScene:
         raise
     except MemoryError as error:
         raise RejectedScene("scene-too-large", f"{shown(root)} needs more memory than a scene may use.") from error
+    except OutsideHome as problem:
+        raise RejectedScene("scene-path-outside", problem.title) from problem
     except Problem as problem:
         raise _rejection(problem, root) from problem
     except (OSError, Tf.ErrorException, ArithmeticError, LookupError, RuntimeError, TypeError, ValueError) as error:
@@ -76,13 +82,15 @@ class _Counts:
     Attributes:
         prims: Composed prims, instance proxies included.
         points: Of everything that can be drawn, with instances.
+        triangles: Of meshes and implicit gprims, with instances.
         layers: Layers that the stage uses.
     """
 
     prims: int = 0
     points: int = 0
+    triangles: int = 0
     layers: int = 0
-    _of_prototype: dict[Sdf.Path, int] = field(default_factory=dict)
+    _of_prototype: dict[Sdf.Path, Size] = field(default_factory=dict)
 
 
 def _count(path: Path, home: Path, root: str) -> _Counts:
@@ -90,61 +98,68 @@ def _count(path: Path, home: Path, root: str) -> _Counts:
     counts = _Counts()
     with usd_diagnostics(WarningLog()):
         stage = open_stage(path)
-        counts.layers = _check_layers(stage, home)
+        counts.layers = used_layers(stage, home)
+        if counts.layers > LIMITS.layers:
+            raise RejectedScene(
+                "scene-too-many-layers", f"The scene uses {counts.layers} layers, more than {LIMITS.layers}."
+            )
         time = stage_time(stage, None)
         for prim in stage.Traverse(Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)):
             counts.prims += 1
             if counts.prims > LIMITS.prims:
                 raise RejectedScene("scene-too-large", f"{shown(root)} has more than {LIMITS.prims} prims.")
-            counts.points += _points(prim, time, counts, ())
+            points, triangles = _size(prim, time, counts, ())
+            counts.points += points
+            counts.triangles += triangles
             if counts.points > LIMITS.points:
                 raise RejectedScene("scene-too-large", f"{shown(root)} has more than {LIMITS.points} points.")
+            if counts.triangles > LIMITS.triangles:
+                raise RejectedScene("scene-too-large", f"{shown(root)} has more than {LIMITS.triangles} triangles.")
     return counts
 
 
-def _check_layers(stage: Usd.Stage, home: Path) -> int:
-    """How many layers the stage uses; all of them lie in the upload."""
-    used = 0
-    for layer in stage.GetUsedLayers():
-        if layer.anonymous:
-            continue
-        used += 1
-        real = layer.realPath or Ar.SplitPackageRelativePathOuter(layer.identifier)[0]
-        if not Path(real.split("[", 1)[0]).resolve().is_relative_to(home):
-            raise RejectedScene("scene-path-outside", "The scene uses a layer outside the upload.")
-    if used > LIMITS.layers:
-        raise RejectedScene("scene-too-many-layers", f"The scene uses {used} layers, more than {LIMITS.layers}.")
-    return used
-
-
-def _points(prim: Usd.Prim, time: Usd.TimeCode, counts: _Counts, parents: tuple[Sdf.Path, ...]) -> int:
-    """Points of a gprim, or of all that a point instancer makes."""
+def _size(prim: Usd.Prim, time: Usd.TimeCode, counts: _Counts, parents: tuple[Sdf.Path, ...]) -> Size:
+    """Of a gprim, or of all that a point instancer makes."""
     if prim.IsA(UsdGeom.PointInstancer):
-        return _instanced_points(UsdGeom.PointInstancer(prim), time, counts, parents)
+        return _instanced_size(UsdGeom.PointInstancer(prim), time, counts, parents)
     if not prim.IsA(UsdGeom.Gprim):
-        return 0
+        return 0, 0
     path = (prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim).GetPath()
     if path not in counts._of_prototype:
-        values = UsdGeom.PointBased(prim).GetPointsAttr().Get(time) if prim.IsA(UsdGeom.PointBased) else None
-        found = GPRIM_POINTS if not prim.IsA(UsdGeom.PointBased) else 0 if values is None else len(values)
-        counts._of_prototype[path] = found
+        counts._of_prototype[path] = _own_size(prim, time)
     return counts._of_prototype[path]
 
 
-def _instanced_points(
+def _own_size(prim: Usd.Prim, time: Usd.TimeCode) -> Size:
+    if not prim.IsA(UsdGeom.PointBased):
+        return GPRIM_POINTS, 2 * GPRIM_POINTS
+    points = len(UsdGeom.PointBased(prim).GetPointsAttr().Get(time) or ())
+    if not prim.IsA(UsdGeom.Mesh):
+        return points, 0
+    mesh = UsdGeom.Mesh(prim)
+    corners, faces = mesh.GetFaceVertexIndicesAttr().Get(time), mesh.GetFaceVertexCountsAttr().Get(time)
+    return points, max(0, len(corners or ()) - 2 * len(faces or ()))
+
+
+def _instanced_size(
     instancer: UsdGeom.PointInstancer, time: Usd.TimeCode, counts: _Counts, parents: tuple[Sdf.Path, ...]
-) -> int:
+) -> Size:
     path = instancer.GetPath()
     indices = instancer.GetProtoIndicesAttr().Get(time)
     if path in parents or indices is None:
-        return 0
+        return 0, 0
     stage = instancer.GetPrim().GetStage()
     sizes = []
     for target in instancer.GetPrototypesRel().GetForwardedTargets():
         prototype = stage.GetPrimAtPath(target)
-        below = _under(prototype) if prototype else iter(())
-        sizes.append(sum(_points(prim, time, counts, (*parents, path)) for prim in below))
-    return sum(sizes[index] for index in indices if 0 <= index < len(sizes))
+        below = [_size(prim, time, counts, (*parents, path)) for prim in (_under(prototype) if prototype else ())]
+        sizes.append((sum(size[0] for size in below), sum(size[1] for size in below)))
+    placed = np.asarray(indices, dtype=np.int64).ravel()
+    copies = np.bincount(placed[(placed >= 0) & (placed < len(sizes))], minlength=len(sizes))
+    return (
+        sum(int(count) * size[0] for count, size in zip(copies, sizes, strict=True)),
+        sum(int(count) * size[1] for count, size in zip(copies, sizes, strict=True)),
+    )
 
 
 def _under(prim: Usd.Prim) -> Iterator[Usd.Prim]:

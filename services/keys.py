@@ -13,12 +13,13 @@ import secrets
 import threading
 import time
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import sqlalchemy as sa
 
 from schemas.problem import ExitCode, Problem
-from schemas.service import SCOPES, KeyRecord, Scope
+from schemas.service import SCOPES, JobBounds, KeyRecord, Scope
 from services.clock import iso
 from services.database import Database
 from services.database.tables import keys as table
@@ -27,6 +28,7 @@ _SECRET = re.compile(r"dia_([0-9a-f]{12})_[A-Za-z0-9_-]{43}")
 _USED_SECONDS = 60.0
 _PATIENCE_SECONDS = 5.0
 _NO_DIGEST = "0" * 64
+_AS_CONFIGURED = JobBounds()
 
 _CONTAINS: dict[Scope, frozenset[Scope]] = {
     "read": frozenset({"read"}),
@@ -34,6 +36,19 @@ _CONTAINS: dict[Scope, frozenset[Scope]] = {
     "publish": frozenset({"read", "publish"}),
     "admin": frozenset(SCOPES),
 }
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a secret stands for.
+
+    Attributes:
+        key: Its key; None if that is unknown, expired or revoked.
+        is_guess: Whether it has the form of a secret, and was nobody's.
+    """
+
+    key: KeyRecord | None
+    is_guess: bool = False
 
 
 def allows(key: KeyRecord, scope: Scope) -> bool:
@@ -49,13 +64,16 @@ class Keys:
         self._noted: dict[str, float] = {}
         self._lock = threading.Lock()
 
-    def create(self, name: str, scopes: Sequence[Scope], expires: float | None = None) -> tuple[KeyRecord, str]:
+    def create(
+        self, name: str, scopes: Sequence[Scope], expires: float | None = None, bounds: JobBounds = _AS_CONFIGURED
+    ) -> tuple[KeyRecord, str]:
         """Makes a key.
 
         Args:
             name: Who or what it is for.
             scopes: What it may do; at least one.
             expires: Seconds since 1970 after which it is refused.
+            bounds: Of its jobs.
 
         Returns:
             The record, and the secret: it cannot be had again.
@@ -81,6 +99,7 @@ class Keys:
             "expires": expires,
             "revoked": None,
             "last_used": None,
+            **bounds.model_dump(),
         }
 
         def insert(connection: sa.Connection) -> None:
@@ -90,20 +109,26 @@ class Keys:
         self._database.retry(insert, _PATIENCE_SECONDS)
         return _record(row), secret
 
-    def authenticate(self, secret: str) -> KeyRecord | None:
-        """The key of a secret; None if it is unknown, expired or revoked."""
+    def authenticate(self, secret: str) -> Found:
+        """What a secret stands for."""
         match = _SECRET.fullmatch(secret)
-        identifier = f"key_{match[1]}" if match else ""
+        if match is None:
+            return Found(None)
         with self._database.read() as connection:
-            row = connection.execute(sa.select(table).where(table.c.id == identifier)).mappings().first()
+            row = connection.execute(sa.select(table).where(table.c.id == f"key_{match[1]}")).mappings().first()
         # As long for an unknown id as for a known one.
         same = hmac.compare_digest(_digest(secret), row["digest"] if row else _NO_DIGEST)
-        return self._used(row) if same else None
+        return Found(self._used(row)) if same else Found(None, is_guess=True)
 
     def alive(self, key_id: str) -> KeyRecord | None:
         """The key of an id, as one that is used now; None if it is unknown, expired or revoked."""
         with self._database.read() as connection:
             return self._used(connection.execute(sa.select(table).where(table.c.id == key_id)).mappings().first())
+
+    def valid(self, ids: Collection[str]) -> set[str]:
+        """Those of some ids whose keys are neither unknown nor expired nor revoked."""
+        with self._database.read() as connection:
+            return set(connection.scalars(sa.select(table.c.id).where(_is_valid(), table.c.id.in_(set(ids)))))
 
     def list(self) -> list[KeyRecord]:
         """All keys, newest first, the revoked ones too."""
@@ -136,9 +161,8 @@ class Keys:
 
     def any(self) -> bool:
         """Whether there is a key that is not revoked and not expired."""
-        alive = sa.and_(table.c.revoked.is_(None), sa.or_(table.c.expires.is_(None), table.c.expires > time.time()))
         with self._database.read() as connection:
-            return connection.scalar(sa.select(table.c.id).where(alive).limit(1)) is not None
+            return connection.scalar(sa.select(table.c.id).where(_is_valid()).limit(1)) is not None
 
     def _used(self, row: Any) -> KeyRecord | None:
         now = time.time()
@@ -159,6 +183,10 @@ class Keys:
             connection.execute(table.update().where(table.c.id == key_id, stale).values(last_used=now))
 
 
+def _is_valid() -> sa.ColumnElement[bool]:
+    return sa.and_(table.c.revoked.is_(None), sa.or_(table.c.expires.is_(None), table.c.expires > time.time()))
+
+
 def _digest(secret: str) -> str:
     return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()
 
@@ -172,4 +200,5 @@ def _record(row: Any) -> KeyRecord:
         expires=iso(row["expires"]) if row["expires"] is not None else None,
         revoked=iso(row["revoked"]) if row["revoked"] is not None else None,
         last_used=iso(row["last_used"]) if row["last_used"] is not None else None,
+        bounds=JobBounds(**{name: row[name] for name in JobBounds.model_fields}),
     )

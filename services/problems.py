@@ -60,6 +60,13 @@ _TYPES = (
         remedy="Use a key with the scope that the detail names.",
     ),
     ProblemType(
+        slug="not-own",
+        title="That belongs to another key.",
+        status=403,
+        explanation="A job or an upload is changed by the key that made it, or by one with the scope `admin`.",
+        remedy="Use the key that made it, or ask an administrator.",
+    ),
+    ProblemType(
         slug="not-found",
         title="There is nothing of this name.",
         status=404,
@@ -72,6 +79,14 @@ _TYPES = (
         status=405,
         explanation="The header `Allow` lists the methods that it supports.",
         remedy="Use one of the methods of the header `Allow`.",
+    ),
+    ProblemType(
+        slug="too-slow",
+        title="The request did not arrive in time.",
+        status=408,
+        explanation="The head of a request has to be there within seconds; a body may not stop, and arrives at a least "
+        "rate on average. Who waits holds places that others need.",
+        remedy="Send smaller parts, or over a faster connection.",
     ),
     ProblemType(
         slug="conflict",
@@ -151,8 +166,17 @@ _TYPES = (
         slug="too-many-requests",
         title="Too many requests.",
         status=429,
-        explanation="Requests of a key are limited, and so are failed authentications of an address.",
+        explanation="Requests of a key are limited, and its scenes that wait for their checks, and so are failed "
+        "authentications of an address.",
         remedy="Wait for the seconds in the header `Retry-After`.",
+    ),
+    ProblemType(
+        slug="headers-too-large",
+        title="The headers of the request are beyond a limit.",
+        status=431,
+        explanation="Bytes and number of headers, of trailers and of the address are limited before anybody looks at "
+        "them.",
+        remedy="Send fewer and shorter headers.",
     ),
     ProblemType(
         slug="internal",
@@ -167,6 +191,15 @@ _TYPES = (
         status=503,
         explanation="The database or the store cannot be reached, or too much is under way at once.",
         remedy="Try again in a few seconds.",
+    ),
+    ProblemType(
+        slug="storage-full",
+        title="The service has no room left.",
+        status=507,
+        explanation="The disk or the quota of the store or of the database is full. Nothing of the request was kept "
+        "that it did not name as received; what is there already can still be read.",
+        remedy="An administrator has to make room, or set DIAPHANE_KEEP_BYTES or DIAPHANE_KEEP_DAYS lower; then repeat "
+        "the request.",
     ),
 )
 
@@ -279,6 +312,7 @@ _TO = rf"(?:{_FROM_ROOT}|[^\s'\"(\[]*?)"
 _HEX = "[0-9a-f]"
 _PATHS = (
     (rf"{_TO}/([a-z][a-z0-9-]{{0,31}})/{_HEX}{{2}}/({_HEX}{{64}})(?!{_HEX})", r"\1/\2"),  # artifacts and blobs
+    (rf"{_TO}/needs/([a-z][a-z0-9-]{{0,31}})/({_HEX}{{64}})(?!{_HEX})", r"\1/\2"),  # artifacts in a child's room
     (rf"{_TO}/sources/\.?{_HEX}{{64}}(?:-{_HEX}{{32}})?/", ""),  # files of scenes and bundles, as these name them
     (rf"{_TO}/sources/({_HEX}{{64}})(?!{_HEX})", r"\1"),
     (rf"{_FROM_ROOT}/(?:tmp|scratch|checkpoints)/(?:[^\s'\"/]+/)*", ""),

@@ -27,6 +27,11 @@ from services.store import canonical_json
 SUFFIXES = (".usd", ".usda", ".usdc", ".usdz", ".glb")
 """Of a file that can be opened as a scene."""
 
+QUOTA_CHECKS = 64
+"""Scenes of one key that may wait for their checks."""
+RETRY_SECONDS = 10
+"""When to come again with a scene beyond them."""
+
 _PATIENCE_SECONDS = 5.0
 _PATH_LENGTH = 512
 _NAMED_MISSING = 100
@@ -34,10 +39,10 @@ _IDS_PER_QUERY = 500
 
 
 class Checks(Protocol):
-    """Where the check of a scene is asked for: `services.engine.jobs.Jobs`."""
+    """Where checks are asked for: `services.engine.jobs.Jobs`."""
 
-    def check_scene(self, scene_id: str) -> None:
-        """Has a worker check the scene; asking again changes nothing."""
+    def check_next(self, scene_id: str) -> None:
+        """Has workers check what the key that sent a scene has waiting, in turn; asking again changes nothing."""
 
 
 class Scenes:
@@ -66,7 +71,7 @@ class Scenes:
 
         Raises:
             Problem: A path is not fit for a file, there are too many files or bytes, or the root is none of them.
-            Refusal: Files were not uploaded.
+            Refusal: Files were not uploaded, or too many scenes of the key wait for their checks.
         """
         _check_paths(root, files)
         references = self._references(files)
@@ -87,6 +92,7 @@ class Scenes:
         def insert(connection: sa.Connection) -> bool:
             if connection.scalar(sa.select(table.c.id).where(table.c.id == scene_id)) is not None:
                 return False
+            _check_quota(connection, by)
             connection.execute(table.insert().values(**row))
             return True
 
@@ -96,7 +102,7 @@ class Scenes:
             new = False  # the same scene came at the same time
         record = self.get(scene_id)
         if record.state == "checking":  # also when it is not new: whoever inserted it may have died before it asked
-            self._jobs.check_scene(scene_id)
+            self._jobs.check_next(scene_id)
         return record, new
 
     def get(self, scene_id: str) -> SceneRecord:
@@ -176,6 +182,18 @@ class Scenes:
                 ExitCode.LIMIT,
             )
         return references
+
+
+def _check_quota(connection: sa.Connection, by: str) -> None:
+    """Bounds what waits of one key."""
+    waiting = sa.select(sa.func.count()).where(table.c.created_by == by, table.c.state == "checking")
+    if int(connection.scalar(waiting) or 0) >= QUOTA_CHECKS:
+        raise Refusal(
+            "too-many-requests",
+            f"{QUOTA_CHECKS} scenes of this key wait for their checks.",
+            "Wait until some are checked.",
+            headers={"Retry-After": str(RETRY_SECONDS)},
+        )
 
 
 def _digest(root: str, files: Mapping[str, str]) -> str:

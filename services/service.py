@@ -49,6 +49,7 @@ def open_service(settings: Settings) -> Service:
         Problem: One of them cannot be opened.
     """
     database = open_database(settings.database_url)
+    database.waits_for_room = False
     storage = open_storage(settings)
     jobs = Jobs(settings, database)
     return Service(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import ipaddress
 from pathlib import Path
 from typing import Any, Self
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from schemas.problem import Problem
@@ -20,13 +21,19 @@ class Settings(BaseSettings):
             whoever can write to the database can run code on the workers.
         store: Folder, or `s3://bucket/prefix` (credentials and endpoint as usual in `AWS_*`); empty: `state`/store.
         cache: Local copies of what lies in an object store; empty: `state`/cache.
-        signing_key: ed25519 seed, base64, that versions are signed with; empty: made once and kept in `state`.
+        signing_key: ed25519 seed, base64, that versions and what aliases mean are signed with; empty: made once and
+            kept in `state`.
         heartbeat: Seconds between two heartbeats of a process.
         ttl: Seconds of silence after which a process is taken for dead.
         poll: Seconds between two looks into a queue.
         slots_render: Child processes of a worker for the role `render`.
         slots_label: The same for `label`.
         slots_train: The same for `train`.
+        slots_check: Uploads that a worker of the role `render` checks at once, beside its tasks.
+        checks_per_key: Uploads of one key that all workers together check at once: less than their slots, so that one
+            key cannot hold them all.
+        check_seconds: Longest time of a check.
+        check_bytes: Memory that a check's process may use.
         task_seconds: Longest time of a task other than a training.
         train_seconds: Longest time of a training.
         task_bytes: Memory that a task's process may use; 0: no bound.
@@ -34,8 +41,13 @@ class Settings(BaseSettings):
         keep_days: Artifacts, jobs and events unused for longer are removed; 0: kept.
         keep_bytes: Beyond this the least recently used artifacts are removed; 0: no bound.
         hosts: Names, separated by commas, that the API answers for beside those of the loopback interface; `*`: any.
+        proxies: Addresses and networks, separated by commas, of the proxies in front whose `X-Forwarded-For` and
+            `X-Forwarded-Proto` are believed; empty: nobody's.
         rate: Requests a second that a key may make, on average.
         burst: Requests that it may make at once.
+        job_pixels: Pixels of all views of a job, where its key has no bound of its own; keys with `admin` have none.
+        job_steps: Optimiser steps of a job; the same.
+        jobs: Jobs of a key that have not ended; the same.
     """
 
     model_config = SettingsConfigDict(env_prefix="DIAPHANE_", frozen=True, extra="ignore")
@@ -51,6 +63,10 @@ class Settings(BaseSettings):
     slots_render: int = Field(default=1, ge=1)
     slots_label: int = Field(default=1, ge=1)
     slots_train: int = Field(default=1, ge=1)
+    slots_check: int = Field(default=2, ge=1)
+    checks_per_key: int = Field(default=1, ge=1)
+    check_seconds: float = Field(default=30.0, gt=0.0)
+    check_bytes: int = Field(default=2 << 30, ge=512 << 20)
     task_seconds: float = Field(default=1800.0, gt=0.0)
     train_seconds: float = Field(default=7 * 86400.0, gt=0.0)
     task_bytes: int = Field(default=0, ge=0)
@@ -60,6 +76,10 @@ class Settings(BaseSettings):
     hosts: str = ""
     rate: float = Field(default=50.0, gt=0.0)
     burst: int = Field(default=200, ge=1)
+    proxies: str = ""
+    job_pixels: int = Field(default=10**10, ge=1)
+    job_steps: int = Field(default=100_000, ge=1)
+    jobs: int = Field(default=100, ge=1)
 
     def __init__(self, **values: Any) -> None:
         try:
@@ -78,6 +98,18 @@ class Settings(BaseSettings):
             raise ValueError("DIAPHANE_TTL has to be at least three times DIAPHANE_HEARTBEAT")
         return self
 
+    @field_validator("proxies")
+    @classmethod
+    def _are_addresses(cls, text: str) -> str:
+        for part in _parts(text):
+            ipaddress.ip_network(part)
+        return text
+
+    @property
+    def trusted_proxies(self) -> tuple[str, ...]:
+        """`proxies`, one by one."""
+        return _parts(self.proxies)
+
     @property
     def database_url(self) -> str:
         """`database`, or SQLite in the state folder."""
@@ -92,3 +124,7 @@ class Settings(BaseSettings):
     def cache_folder(self) -> Path:
         """Where local copies of an object store's content lie."""
         return Path(self.cache) if self.cache else self.state.resolve() / "cache"
+
+
+def _parts(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(",") if part.strip())

@@ -17,12 +17,14 @@ An artifact's address is the sha256 of the canonical JSON of (stage, code versio
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import logging
 import os
 import re
 import shutil
+import stat
 import time
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
@@ -120,10 +122,15 @@ class Store:
 
     Args:
         root: Folder; created if missing.
+
+    Attributes:
+        root: The folder.
+        checkpoints: Folder of what interrupted trainings on this machine go on from.
     """
 
     def __init__(self, root: Path) -> None:
         self.root = root
+        self.checkpoints = root.parent / "checkpoints"
         self._temporary = root / "tmp"
         self._temporary.mkdir(parents=True, exist_ok=True)
         self._clear_temporary(time.time())
@@ -261,12 +268,41 @@ class Store:
 
         If the body raises, nothing is stored. If another process stored the artifact meanwhile, that one stays.
         """
-        folder = self._temporary / f"{address.stage}-{address.key[:8]}-{uuid.uuid4().hex}"
-        folder.mkdir()
-        try:
+        with self._written(f"{address.stage}-{address.key[:8]}") as folder:
             yield folder
             _write_meta(folder, address)
             self._keep(folder, address.artifact)
+
+    def adopt(self, folder: Path, artifact: str) -> None:
+        """Takes an artifact over that a less trusted process wrote into a folder of its own.
+
+        Args:
+            folder: Holds the artifact; it is moved, or stays if another process stored the artifact meanwhile.
+            artifact: `stage/key`.
+
+        Raises:
+            ValueError: It is not this artifact, whole and of plain files: whoever reads it follows no links.
+            OSError: The store cannot be written.
+        """
+        present = _plain_files(folder)
+        if META not in present or present - {META} != set(read_meta(folder, artifact)["files"]):
+            raise ValueError(f"What was made is no whole artifact {artifact}.")
+        try:
+            self._keep(folder, artifact)
+        except OSError as error:
+            if error.errno != errno.EXDEV:
+                raise
+            with self._written(artifact.replace("/", "-")) as copy:
+                shutil.copytree(folder, copy, symlinks=True, dirs_exist_ok=True)
+                self._keep(copy, artifact)
+
+    @contextmanager
+    def _written(self, name: str) -> Iterator[Path]:
+        """A temporary folder on the store's own file system."""
+        folder = self._temporary / f"{name}-{uuid.uuid4().hex}"
+        folder.mkdir(parents=True)  # the store may have gone away and come back empty
+        try:
+            yield folder
         finally:
             shutil.rmtree(folder, ignore_errors=True)
 
@@ -360,10 +396,28 @@ def write_durably(path: Path, text: str) -> None:
     sync(path.parent)
 
 
+def _plain_files(folder: Path) -> set[str]:
+    """Relative names of the files in a folder.
+
+    Raises:
+        ValueError: Something in it is a link, a pipe or a device.
+    """
+    found = set()
+    for parent, folders, files in os.walk(folder):
+        for name in (*folders, *files):
+            path = Path(parent, name)
+            mode = path.lstat().st_mode
+            if stat.S_ISREG(mode):
+                found.add(path.relative_to(folder).as_posix())
+            elif not stat.S_ISDIR(mode):
+                raise ValueError("What was made has more than plain files in it.")
+    return found
+
+
 def _signature(folder: Path) -> str:
     """Names, sizes and times of change of all files, as one text."""
-    stats = ((path, path.stat()) for path in sorted(folder.rglob("*")) if path.is_file())
-    return canonical_json([[str(path.relative_to(folder)), stat.st_size, stat.st_mtime_ns] for path, stat in stats])
+    found = ((path, path.stat()) for path in sorted(folder.rglob("*")) if path.is_file())
+    return canonical_json([[str(path.relative_to(folder)), now.st_size, now.st_mtime_ns] for path, now in found])
 
 
 def _write_meta(folder: Path, address: Address) -> None:

@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import sqlalchemy as sa
@@ -39,6 +39,7 @@ class Upload:
         bytes: Of the whole file.
         received: Bytes that are there.
         complete: Whether the file is a blob now.
+        made_by: Id of the key that began it.
     """
 
     id: str
@@ -46,6 +47,7 @@ class Upload:
     bytes: int
     received: int
     complete: bool
+    made_by: str = ""
 
 
 @dataclass
@@ -171,7 +173,7 @@ class Uploads:
             connection.execute(table.update().where(table.c.id == upload.id).values(finished=time.time()))
 
         self._database.retry(update, _PATIENCE_SECONDS)
-        return Upload(upload.id, upload.sha256, upload.bytes, upload.bytes, complete=True)
+        return replace(upload, received=upload.bytes, complete=True)
 
     def _remove(self, upload_id: str) -> None:
         self._database.retry(
@@ -228,4 +230,6 @@ def _row(connection: sa.Connection, query: sa.Select[Any], upload_id: str) -> An
 
 
 def _upload(row: Any) -> Upload:
-    return Upload(row["id"], row["sha256"], row["bytes"], row["received"], row["finished"] is not None)
+    return Upload(
+        row["id"], row["sha256"], row["bytes"], row["received"], row["finished"] is not None, row["created_by"]
+    )

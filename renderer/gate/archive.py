@@ -13,7 +13,8 @@ import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
-from renderer.gate.files import HEAD, LAYER_SUFFIXES, Kind, classify, suffix_of
+from renderer.gate.files import LAYER_SUFFIXES, Kind, classify, suffix_of
+from renderer.gate.images import HEAD
 from renderer.gate.names import check_file_name
 from renderer.gate.problems import RejectedScene, shown
 from schemas.limits import LIMITS

@@ -5,6 +5,7 @@ from __future__ import annotations
 import mmap
 import posixpath
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -94,6 +95,7 @@ class _Checker:
         if self._checked.pixels > MAX_PIXELS:
             raise RejectedScene("scene-texture", f"The images have more than {MAX_PIXELS} pixels together.")
         self._read_layers()
+        _check_clips(self._checked.layers.values())
         named = self._read_documents()
         for content in self._checked.layers.values():
             self._check_named(content)
@@ -179,9 +181,12 @@ class _Checker:
                     )
 
     def _candidates(self, layer: str, path: str) -> list[str]:
-        """Files of the upload that a resolver could take a path in a layer for."""
+        """Files of the upload that a resolver takes a path in a layer for, the first of them that exists.
+
+        It looks beside the layer, then in the folder that it works in, which is empty, then beside the root layer.
+        """
         package, member = split_package(layer)
-        bases = [posixpath.dirname(package), posixpath.dirname(self._root), ""]
+        bases = [posixpath.dirname(package), posixpath.dirname(self._root)]
         found = [_inside(base, path) for base in bases]
         if member is not None:
             found += [f"{package}[{_inside(base, path)}]" for base in (posixpath.dirname(member), "")]
@@ -229,6 +234,25 @@ class _Checker:
                         found[target] = found[name] + 1
                         pending.append(target)
         return list(found)
+
+
+def _check_clips(layers: Iterable[LayerContent]) -> None:
+    """Bounds the steps of value clips, for each of which USD looks for a file.
+
+    Start, end and stride may come from different layers, so the widest range counts with the smallest stride.
+    """
+    found: dict[str, list[float]] = {"starttime": [], "endtime": [], "stride": []}
+    for content in layers:
+        for name, times in content.clip_times.items():
+            found[name] += times
+    strides = [stride for stride in found["stride"] if stride > 0.0]  # USD refuses others
+    if not (found["starttime"] and found["endtime"] and strides):
+        return
+    steps = (max(found["endtime"]) - min(found["starttime"])) / min(strides)
+    if not steps <= LIMITS.clip_steps:
+        raise RejectedScene(
+            "scene-too-large", f"The value clips have {steps:.3g} steps, more than {LIMITS.clip_steps}."
+        )
 
 
 def _inside(base: str, path: str) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from renderer.gate.images import IMAGE_SUFFIXES, check_image, foreign_image, is_image
+from renderer.gate.images import HEAD, IMAGE_SUFFIXES, check_image, foreign_image, is_image
 from renderer.gate.names import check_file_name
 from renderer.gate.problems import RejectedScene, shown
 from schemas.limits import LIMITS
@@ -17,8 +17,6 @@ from schemas.limits import LIMITS
 Kind = Literal["layer", "package", "materialx", "image", "glb", "other"]
 
 LAYER_SUFFIXES = (".usd", ".usda", ".usdc")
-HEAD = 1 << 18
-"""Bytes of a file's beginning that decide what it is: a JPEG's size may come after its embedded preview."""
 TEXT_COOKIES = (b"#usda ", b"#sdf ", b"#usd ")
 CRATE_COOKIE = b"PXR-USDC"
 

@@ -46,13 +46,16 @@ class GlbContent:
     document: Object
     buffer: memoryview
     _arrays: dict[int, NDArray[Any]] = field(default_factory=dict)
+    _items: dict[str, list[Object]] = field(default_factory=dict)
 
     def items(self, key: str) -> list[Object]:
-        """The objects of a list at the top of the document."""
-        found = self.document.get(key, [])
-        if not isinstance(found, list) or not all(isinstance(item, dict) for item in found):
-            raise damaged(self.name)
-        return found
+        """The objects of a list at the top of the document, looked at once: every pick asks for it."""
+        if key not in self._items:
+            found = self.document.get(key, [])
+            if not isinstance(found, list) or not all(isinstance(item, dict) for item in found):
+                raise damaged(self.name)
+            self._items[key] = found
+        return self._items[key]
 
     def view(self, index: Any) -> memoryview:
         """The bytes of a buffer view."""
@@ -141,16 +144,19 @@ def check_glb(path: Path, name: str) -> int:
     pixels = sum(check_image(name, content.image(index)) for index in range(len(content.items("images"))))
     if pixels > 8 * LIMITS.texture_pixels:
         raise RejectedScene("scene-texture", f"The images of {shown(name)} have too many pixels together.")
-    points = [_mesh_points(content, mesh) for mesh in content.items("meshes")]
-    total = prims = 0
-    for node, _ in walk_nodes(content):
+    sizes = [_mesh_size(content, mesh) for mesh in content.items("meshes")]
+    points = triangles = prims = 0
+    for node, _, _ in _reached(content):
         prims += 1
         if "mesh" in node:
             mesh = content.pick("meshes", node["mesh"])
             prims += len(mesh["primitives"])
-            total += points[node["mesh"]]
-        if prims > LIMITS.prims or total > LIMITS.points:
-            raise RejectedScene("scene-too-large", f"{shown(name)} has too many nodes or points.")
+            points += sizes[node["mesh"]][0]
+            triangles += sizes[node["mesh"]][1]
+        if prims > LIMITS.prims or points > LIMITS.points or triangles > LIMITS.triangles:
+            raise RejectedScene("scene-too-large", f"{shown(name)} has too many nodes, points or triangles.")
+    for _ in walk_nodes(content):
+        pass  # every transform is one
     return pixels
 
 
@@ -236,12 +242,12 @@ def _uris(value: Any) -> Iterator[Any]:
             pending.extend(item)
 
 
-def _mesh_points(content: GlbContent, mesh: Object) -> int:
-    """Points of a mesh; checks its arrays."""
+def _mesh_size(content: GlbContent, mesh: Object) -> tuple[int, int]:
+    """Points of a mesh, and the most triangles that they may be joined to; checks its arrays."""
     primitives = mesh.get("primitives")
     if not isinstance(primitives, list):
         raise damaged(content.name)
-    total = 0
+    points = triangles = 0
     for primitive in primitives:
         attributes = primitive.get("attributes") if isinstance(primitive, dict) else None
         if not isinstance(attributes, dict) or "POSITION" not in attributes:
@@ -253,11 +259,16 @@ def _mesh_points(content: GlbContent, mesh: Object) -> int:
         if arrays["POSITION"].shape[1] != 3:
             raise damaged(content.name)
         if "indices" in primitive:
+            corners = number(content.name, content.pick("accessors", primitive["indices"]), "count")
             indices = content.array(primitive["indices"])
             if indices.dtype.kind != "u" or indices.shape[1] != 1 or int(indices.max()) >= count:
                 raise damaged(content.name)
-        total += count
-    return total
+        else:
+            corners = count
+        points += count
+        # In strips and fans every corner makes one.
+        triangles += corners if primitive.get("mode", 4) in (5, 6) else corners // 3
+    return points, triangles
 
 
 def walk_nodes(content: GlbContent) -> Iterator[tuple[Object, NDArray[np.float64]]]:
@@ -266,31 +277,45 @@ def walk_nodes(content: GlbContent) -> Iterator[tuple[Object, NDArray[np.float64
     Raises:
         RejectedScene: They are no forest, or a transform is none.
     """
+    matrices: dict[int, NDArray[np.float64]] = {}
+    for node, index, parent in _reached(content):
+        above = np.eye(4) if parent is None else matrices[parent]
+        matrices[index] = above @ _matrix(content.name, node)
+        yield node, matrices[index]
+
+
+def _reached(content: GlbContent) -> Iterator[tuple[Object, int, int | None]]:
+    """The nodes of the default scene, parents first, each with its index and its parent's.
+
+    Raises:
+        RejectedScene: They are no forest.
+    """
     scenes = content.items("scenes")
-    nodes = content.items("nodes")
     chosen = content.pick("scenes", content.document.get("scene", 0)).get("nodes", []) if scenes else []
-    pending = [(index, np.eye(4), 0) for index in reversed(chosen)] if isinstance(chosen, list) else []
+    pending: list[tuple[Any, int | None, int]] = []
+    pending += [(index, None, 0) for index in reversed(chosen)] if isinstance(chosen, list) else []
     seen: set[int] = set()
     while pending:
         index, parent, depth = pending.pop()
         node = content.pick("nodes", index)
-        if index in seen or len(seen) > len(nodes):
+        if index in seen:
             raise damaged(content.name)
         if depth > MAX_NODE_DEPTH:
             raise RejectedScene("scene-too-large", f"{shown(content.name)} has nodes too deep in each other.")
         seen.add(index)
-        matrix = parent @ _matrix(content.name, node)
-        yield node, matrix
+        yield node, index, parent
         children = node.get("children", [])
         if not isinstance(children, list):
             raise damaged(content.name)
-        pending.extend((child, matrix, depth + 1) for child in reversed(children))
+        pending.extend((child, index, depth + 1) for child in reversed(children))
 
 
 def _matrix(name: str, node: Object) -> NDArray[np.float64]:
     if "matrix" in node:
         return floats(name, node["matrix"], 16).reshape(4, 4).T
     matrix = np.eye(4)
+    if not {"rotation", "scale", "translation"} & node.keys():
+        return matrix
     x, y, z, w = floats(name, node.get("rotation", (0, 0, 0, 1)), 4)
     matrix[:3, :3] = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 
 from renderer.gate.problems import RejectedScene, shown
 from schemas.limits import LIMITS
@@ -38,6 +39,13 @@ FOREIGN: tuple[tuple[bytes, int, str], ...] = (
 
 FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 """JPEG markers with the size of the picture."""
+HEAD = 1 << 18
+"""Bytes of a file's beginning that decide what it is: what counts of a JPEG may come after its embedded preview."""
+
+
+DEPTHS: Mapping[int, tuple[int, ...]] = {0: (1, 2, 4, 8, 16), 2: (8, 16), 3: (1, 2, 4, 8), 4: (8, 16), 6: (8, 16)}
+"""Colour types of PNG, and how many bits a sample of each may have (PNG, third edition, table 12)."""
+PALETTE = 3
 
 
 def is_image(head: bytes) -> bool:
@@ -59,6 +67,9 @@ def check_image(name: str, head: bytes) -> int:
     size = _png_size(head) if head.startswith(PNG) else _jpeg_size(head)
     if size is None or not (size[0] and size[1]):
         raise RejectedScene("scene-texture", f"{shown(name)} is a damaged image.")
+    fault = _png_fault(head) if head.startswith(PNG) else None
+    if fault is not None:
+        raise RejectedScene("scene-texture", f"{shown(name)} is a damaged image: {fault}.")
     pixels = size[0] * size[1]
     if pixels > LIMITS.texture_pixels:
         raise RejectedScene("scene-texture", f"{shown(name)} has {pixels} pixels, more than {LIMITS.texture_pixels}.")
@@ -70,6 +81,25 @@ def _png_size(head: bytes) -> tuple[int, int] | None:
         return None
     width, height = struct.unpack_from(">II", head, 16)
     return width, height
+
+
+def _png_fault(head: bytes) -> str | None:
+    """What a decoder would stumble over in front of the pixels, if there is anything."""
+    depth, colour = head[24:26] if len(head) >= 26 else (0, -1)
+    if depth not in DEPTHS.get(colour, ()):
+        return "its kind of colour is none of PNG's"
+    if colour != PALETTE:
+        return None
+    at = len(PNG)
+    while at + 8 <= len(head):
+        length, kind = struct.unpack_from(">I4s", head, at)
+        if kind == b"PLTE":
+            fits = length % 3 == 0 and 0 < length // 3 <= 1 << depth
+            return None if fits else "its palette is of no possible size"
+        if kind in (b"IDAT", b"IEND"):
+            return "it has colours of a palette, and no palette"
+        at += 12 + length
+    return None if len(head) >= HEAD else "it has colours of a palette, and no palette"
 
 
 def _jpeg_size(head: bytes) -> tuple[int, int] | None:

@@ -24,6 +24,13 @@ MAX_VALUE_DEPTH = 32
 PLAIN_FIELDS = frozenset(("subLayerOffsets",))
 """Fields that have no value in Python, and no files."""
 ARC_FIELDS = ("references", "payload")
+CLIP_TIMES = {
+    f"{prefix}{name}": name.lower()
+    for prefix in ("template", "clipTemplate")
+    for name in ("StartTime", "EndTime", "Stride")
+}
+"""Fields of value clips that are named by templates."""
+CLIP_ARRAYS = ("active", "times", "assetPaths")
 COMPOSING = frozenset(("references", "payload", "inheritPaths", "specializes", "variantSetNames"))
 """Fields of a prim that bring in what is elsewhere."""
 
@@ -37,6 +44,7 @@ class LayerContent:
         layer: The layer, kept so that a stage need not read it again.
         arcs: Files that are composed: sublayers, references, payloads, value clips; as authored, cleaned.
         assets: Other files that are named.
+        clip_times: Of value clips that are named by templates: start, end and stride, each as often as it is written.
         composing: Prims, and variants of prims, with fields that bring in what is elsewhere.
     """
 
@@ -44,6 +52,7 @@ class LayerContent:
     layer: Sdf.Layer
     arcs: set[str] = field(default_factory=set)
     assets: set[str] = field(default_factory=set)
+    clip_times: dict[str, list[float]] = field(default_factory=dict)
     composing: set[Sdf.Path] = field(default_factory=set)
 
 
@@ -104,6 +113,8 @@ class _LayerReader:
                 self._assets(getattr(item, "customData", None), 0)
         elif key in ("clips", "clipTemplateAssetPath"):
             self._clips(value, 0)
+        elif key in CLIP_TIMES:
+            self._clip_time(key, value)
         elif key == "variantSelection":
             if any("`" in str(choice) for choice in dict(value).values()):
                 raise RejectedScene("scene-expression", f"{self._shown} selects a variant by an expression.")
@@ -124,6 +135,14 @@ class _LayerReader:
             for key, item in value.items():
                 if isinstance(item, dict) or key == "templateAssetPath":
                     self._clips(item, depth + 1)
+                elif key in CLIP_TIMES:
+                    self._clip_time(key, item)
+                elif key in CLIP_ARRAYS and hasattr(item, "__len__") and len(item) > LIMITS.clip_steps:
+                    raise RejectedScene("scene-too-large", f"{self._shown} has value clips of too many steps.")
+
+    def _clip_time(self, key: str, value: Any) -> None:
+        if isinstance(value, int | float):
+            self.content.clip_times.setdefault(CLIP_TIMES[key], []).append(float(value))
 
     def _paths(self, value: Any, depth: int) -> Iterator[str]:
         if depth > MAX_VALUE_DEPTH:

@@ -8,11 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.usd.parts import Part
+from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 from schemas.scene import Batch
-
-MAX_TRIANGLES = 60_000_000
-"""About 3.5 GB of arrays when every corner is its own vertex."""
 
 FARTHEST = 1e30
 """Metres from the stage's origin, along each axis."""
@@ -52,9 +50,9 @@ def assemble(placed: list[Placed]) -> Arrays:
     """
     vertices = sum(len(p.matrices) * len(p.part.positions) for p in placed)
     triangles = sum(len(p.matrices) * len(p.part.triangles) for p in placed)
-    if triangles > MAX_TRIANGLES:
+    if triangles > LIMITS.triangles:
         raise Problem(
-            f"The scene has {triangles} triangles with all instances, more than {MAX_TRIANGLES}.",
+            f"The scene has {triangles} triangles with all instances, more than {LIMITS.triangles}.",
             "Split it, or deactivate parts of it.",
             ExitCode.LIMIT,
         )

@@ -9,7 +9,7 @@ from pxr import Sdf, Usd, UsdShade
 from renderer.usd import materialx
 from renderer.usd.drivers import Driver
 from renderer.usd.networks import Network, category_of
-from renderer.usd.stage import WarningLog
+from renderer.usd.stage import WarningLog, is_inside
 from renderer.usd.surfaces import SURFACES, Surface
 from renderer.usd.textures import TextureTable
 
@@ -66,7 +66,8 @@ class MaterialTable:
         if found is not None:
             document, name = found
             if str(document) not in self._documents:
-                self._documents[str(document)] = materialx.document_stage(document)
+                there = is_inside(self.textures.home, str(document))
+                self._documents[str(document)] = materialx.document_stage(document) if there else None
             opened = self._documents[str(document)]
             material = materialx.material_named(opened, name) if opened is not None else None
             shaders = _surface_shaders(material) if material else []

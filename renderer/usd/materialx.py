@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
-from pxr import Sdf, Tf, Usd, UsdShade
+from pxr import Ar, Sdf, Tf, Usd, UsdShade
 
 Element = ElementTree.Element
 
@@ -35,7 +35,8 @@ def referenced_material(stage: Usd.Stage, path: Sdf.Path) -> tuple[Path, str] | 
             arcs = (*spec.referenceList.GetAddedOrExplicitItems(), *spec.payloadList.GetAddedOrExplicitItems())
             for arc in arcs:
                 if str(arc.assetPath).lower().endswith(".mtlx"):
-                    document = Path(Sdf.ComputeAssetPathRelativeToLayer(spec.layer, arc.assetPath))
+                    named = Sdf.ComputeAssetPathRelativeToLayer(spec.layer, arc.assetPath)
+                    document = Path(str(Ar.GetResolver().Resolve(named)) or named)
                     return document, (arc.primPath.name if above == path else "") or path.name
     return None
 

@@ -9,11 +9,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from pxr import Sdf, Tf, Usd, UsdUtils
+from pxr import Ar, Sdf, Tf, Usd, UsdUtils
 
 from schemas.problem import ExitCode, Problem
 
 USD_SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
+
+
+class OutsideHome(Problem):
+    """A scene that may use the files of one folder only uses others."""
 
 
 class WarningLog:
@@ -44,8 +48,8 @@ def usd_diagnostics(log: WarningLog) -> Iterator[None]:
     try:
         yield
     finally:
-        for diagnostic in delegate.TakeUncoalescedDiagnostics():
-            text = str(diagnostic.commentary).strip()
+        # A stage is composed by several threads, which say what they find in any order.
+        for text in sorted(str(diagnostic.commentary).strip() for diagnostic in delegate.TakeUncoalescedDiagnostics()):
             text = re.sub(r" \((instantiating|recomposing|getting).*? stage .*$", "", text, flags=re.DOTALL)
             if ".mtlx@" in text:
                 # The material reader reads these documents itself, and reports those that it cannot.
@@ -102,6 +106,35 @@ def open_stage(path: Path, variants: tuple[str, ...] = ()) -> Usd.Stage:
     if variants:
         _select_variants(stage, [Selection.of(text) for text in variants])
     return stage
+
+
+def is_inside(home: Path | None, name: str) -> bool:
+    """Whether a file that was found, or the package that it is in, lies in a folder.
+
+    Args:
+        home: The folder, resolved; None: anywhere will do.
+        name: As the asset resolver gave it; one that it did not find is relative, and lies nowhere.
+    """
+    if home is None:
+        return True
+    file = Path(Ar.SplitPackageRelativePathOuter(name)[0])
+    return file.is_absolute() and file.resolve().is_relative_to(home)
+
+
+def used_layers(stage: Usd.Stage, home: Path | None) -> int:
+    """How many layers a stage uses, those of value clips included.
+
+    Args:
+        stage: The stage.
+        home: Folder that all of them have to lie in, resolved; None: anywhere will do.
+
+    Raises:
+        Problem: One lies elsewhere.
+    """
+    layers = [layer for layer in stage.GetUsedLayers() if not layer.anonymous]
+    if not all(is_inside(home, layer.realPath or layer.identifier) for layer in layers):
+        raise OutsideHome("The scene uses a layer outside its folder.", "Put the layer into the folder.")
+    return len(layers)
 
 
 def stage_time(stage: Usd.Stage, time: float | None) -> Usd.TimeCode:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from pxr import Ar
 
+from renderer.usd.stage import is_inside
 from renderer.usd.udim import Grid, atlas, grid_of
 from schemas.colour import linear_to_srgb, srgb_to_linear
 from schemas.limits import LIMITS
@@ -66,8 +67,14 @@ class Decoded:
 
 @dataclass
 class TextureTable:
-    """The textures of a scene, each image and way of sampling it once."""
+    """The textures of a scene, each image and way of sampling it once.
 
+    Attributes:
+        home: Folder that images have to lie in, resolved; None: anywhere.
+        textures: What was asked for so far.
+    """
+
+    home: Path | None = None
     textures: list[Texture] = field(default_factory=list)
     _index: dict[tuple[ImageFile, tuple[Wrap, Wrap], int | None, bool], int] = field(default_factory=dict)
     _images: dict[ImageFile, Decoded] = field(default_factory=dict)
@@ -78,6 +85,8 @@ class TextureTable:
         Raises:
             TextureUnreadable: There is no such image.
         """
+        if not all(is_inside(self.home, path) for path in ([path for _, path in file.tiles] or [file.path])):
+            raise TextureUnreadable("the texture is missing")
         if file not in self._images:
             self._images[file] = _decode_tiles(file) if file.tiles else decode_image(read_asset(file.path), file.space)
         return self._images[file]
@@ -147,7 +156,9 @@ def decode_image(data: bytes, space: str = "auto", max_side: int = MAX_SIDE) -> 
             coloured = file.mode in ("RGB", "RGBA", "P", "PA", "CMYK", "YCbCr", "LAB", "RGBX", "RGBa") and not deep
             has_alpha = file.has_transparency_data
             image = (_grey8(file) if file.mode.startswith(("I", "F")) else file).convert("RGBA")
-    except (OSError, ValueError, SyntaxError, EOFError, RuntimeError, Image.DecompressionBombError) as error:
+    except MemoryError:
+        raise
+    except Exception as error:  # decoders raise whatever they stumble over: a palette that is missing is an assertion
         raise TextureUnreadable("the texture cannot be decoded") from error
     return Decoded(_fitted(image, max_side), space == "sRGB" or (space == "auto" and coloured), has_alpha)
 

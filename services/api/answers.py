@@ -12,6 +12,7 @@ from schemas.service import (
     DatasetRecord,
     EventRecord,
     ExecutorRecord,
+    JobBounds,
     JobRecord,
     KeyRecord,
     MeasurementRecord,
@@ -105,11 +106,12 @@ class Reasoned(_Model):
 
 
 class NewKey(_Model):
-    """A key to be made; `expires` is a time with a zone."""
+    """A key to be made; `expires` is a time with a zone, `bounds` hold for its jobs."""
 
     name: Title
     scopes: list[Scope] = Field(min_length=1, max_length=4)
     expires: datetime | None = None
+    bounds: JobBounds = JobBounds()
 
 
 class CreatedKey(_Model):
@@ -134,7 +136,7 @@ class Workers(_Model):
 
 
 class SigningKeys(_Model):
-    """Raw ed25519 public keys, base64, that versions are signed with."""
+    """Raw ed25519 public keys, base64: the one that versions and aliases are signed with, then those before it."""
 
     keys: list[str]
 

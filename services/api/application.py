@@ -13,8 +13,10 @@ from services import dashboard
 from services.api import errors
 from services.api.feeds import Feeds
 from services.api.health import Readiness
+from services.api.leases import Leases
 from services.api.metrics import Metrics
 from services.api.observe import LOOPBACK, Observe
+from services.api.parameters import require_known
 from services.api.routes import GUARDED, OPEN, routes, scope_of
 from services.api.security import Guard
 from services.dashboard import OPEN_PAGES, PAGES, SESSION_ANSWERS, refusals
@@ -48,16 +50,17 @@ def create_app(service: Service, *, hosts: Sequence[str] = LOOPBACK) -> FastAPI:
     app.state.feeds = feeds
     app.state.metrics = Metrics(service, feeds)
     app.state.readiness = Readiness(service)
-    app.state.guard = guard = Guard(service.keys, settings.rate, settings.burst)
+    app.state.guard = guard = Guard(service.keys, settings.rate, settings.burst, service.database)
     app.state.routers = (*GUARDED, *OPEN, *PAGES, *SESSION_ANSWERS, *OPEN_PAGES)
 
-    root = APIRouter(dependencies=[Depends(guard)])
+    root = APIRouter(dependencies=[Depends(guard), Depends(require_known)])
     for router in GUARDED:
         root.include_router(router)
     app.include_router(root)
     for router in OPEN:
-        app.include_router(router)
+        app.include_router(router, dependencies=[Depends(require_known)])
     dashboard.install(app, service)
+    app.state.leases = Leases(service.keys.valid, app.state.sessions.valid)
     errors.install(app, refusals.answer)
     app.add_middleware(
         Observe,
@@ -66,6 +69,7 @@ def create_app(service: Service, *, hosts: Sequence[str] = LOOPBACK) -> FastAPI:
         hosts=hosts,
         window=settings.burst / settings.rate,
         burst=settings.burst,
+        note_full=app.state.readiness.note_full,
     )
     return app
 
@@ -75,3 +79,4 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     to_thread.current_default_thread_limiter().total_tokens = THREADS
     yield
     app.state.feeds.close()
+    await to_thread.run_sync(app.state.guard.settle)

@@ -2,6 +2,8 @@
 
 Rules for JSON:
 - the limit holds while reading, whatever `Content-Length` says or does not say;
+- a body may not stop, and arrives at a least rate on average: who waits holds a place that others need;
+- nothing is read on for a key that was revoked meanwhile;
 - nesting is measured on the bytes, before a parser recurses into them;
 - text that is no Unicode, NUL characters, NaN and infinities, and members named twice are refused: what follows would
   meet them as errors of a database or as different readings of the same text.
@@ -12,16 +14,22 @@ from __future__ import annotations
 import json
 import math
 import re
+import time
 from typing import Any, Generic, TypeVar
 
+import anyio
 from fastapi import Request
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ValidationError
 
 from schemas.limits import LIMITS
+from services.api.leases import revocable
 from services.problems import Refusal
 
 M = TypeVar("M", bound=BaseModel)
+
+_CLOSE = {"Connection": "close"}
+"""What has not been read would be taken for the next request."""
 
 _TOKENS = re.compile(rb'"(?:[^"\\]|\\.)*"|[\[\]{}]', re.DOTALL)
 
@@ -67,18 +75,35 @@ async def read_body(request: Request, limit: int) -> bytes:
     """A whole body of at most `limit` bytes.
 
     Raises:
-        Refusal: It is larger.
+        Refusal: It is larger, or arrives too slowly, or its key was revoked meanwhile.
     """
     announced = request.headers.get("content-length", "")
     if announced.isdecimal() and int(announced[:20]) > limit:
         raise _too_large(limit)
-    parts, size = [], 0
-    async for part in request.stream():
+    with revocable(request.scope):
+        return await _read(request, limit)
+    raise Refusal("unauthenticated", "The key was revoked while the body arrived.", headers=_CLOSE)
+
+
+async def _read(request: Request, limit: int) -> bytes:
+    parts: list[bytes] = []
+    size, begun = 0, time.monotonic()
+    pieces = request.stream()
+    while True:
+        stall = LIMITS.body_stall_seconds
+        late = stall + size / LIMITS.body_rate - (time.monotonic() - begun)
+        try:
+            with anyio.fail_after(min(stall, max(0.0, late))):
+                part = await anext(pieces)
+        except StopAsyncIteration:
+            return b"".join(parts)
+        except TimeoutError:
+            detail = f"The body stopped for {stall:g} seconds, or came at less than {LIMITS.body_rate} bytes a second."
+            raise Refusal("too-slow", detail, headers=_CLOSE) from None
         size += len(part)
         if size > limit:
             raise _too_large(limit)
         parts.append(part)
-    return b"".join(parts)
 
 
 def parse_json(raw: bytes) -> Any:

@@ -26,7 +26,8 @@ _DESCRIPTION = (
     "explained at `/v1/problems`. Lists come in pages, with a `Link` to the next. Beside `Authorization`, a request "
     "may have an `X-Request-ID`, which the answer and the logs repeat."
 )
-_ALWAYS = (421, 500, 503)
+_ALWAYS = (421, 431, 500, 503)
+_WRITING = (507,)
 _GUARDED = (401, 403, 429)
 _EXAMPLES: dict[str, Any] = {
     "JobSpec": {
@@ -78,21 +79,21 @@ def _describe(paths: dict[str, Any], routers: tuple[APIRouter, ...]) -> None:
         for method in route.methods or ():
             operation = paths[route.path_format][method.lower()]
             operation["operationId"] = route.name
-            _describe_one(operation, route, guarded=routers is GUARDED)
+            _describe_one(operation, route, guarded=routers is GUARDED, writes=method not in ("GET", "HEAD"))
 
 
-def _describe_one(operation: dict[str, Any], route: APIRoute, *, guarded: bool) -> None:
+def _describe_one(operation: dict[str, Any], route: APIRoute, *, guarded: bool, writes: bool) -> None:
     model = body_of(route)
     if model is not None:
         content: dict[str, Any] = {"schema": {"$ref": _REFERENCE.format(model=model.__name__)}}
         content["example"] = _EXAMPLES[model.__name__]
         operation["requestBody"] = {"required": True, "content": {"application/json": content}}
-    statuses = set(_ALWAYS)
+    statuses = set(_ALWAYS) | set(_WRITING if writes else ())
     if guarded:
         operation["security"] = [{"key": [scope_of(route)]}]
         statuses |= set(_GUARDED)
     if "requestBody" in operation:
-        statuses |= {400, 413, 415, 422}
+        statuses |= {400, 408, 413, 415, 422}
     places = {parameter["in"] for parameter in operation.get("parameters", ())}
     statuses |= {404} if "path" in places else set()
     statuses |= {422} if places & {"query", "header"} else set()

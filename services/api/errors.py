@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
@@ -18,6 +19,7 @@ from starlette.requests import ClientDisconnect
 from schemas.problem import Problem
 from services.api.routes import methods_of
 from services.api.wording import faults, sentence
+from services.database.connection import is_full
 from services.problems import MEDIA_TYPE, Refusal, refusal_of
 
 _ERRORS = 20
@@ -34,6 +36,7 @@ _OF_STATUS = {
     416: "range-not-satisfiable",
     422: "invalid",
     503: "unavailable",
+    507: "storage-full",
 }
 
 Answer = Callable[[Refusal, Any], Response]
@@ -58,6 +61,9 @@ def refusal_for(error: Exception) -> Refusal | None:
     """What an error means for the client; None: it is a fault of the service."""
     if isinstance(error, Refusal):
         return error
+    if _is_full(error):
+        log.error("no room is left", error=type(error).__name__)
+        return Refusal("storage-full")
     if isinstance(error, Problem):
         return refusal_of(error)
     if isinstance(error, ClientDisconnect):
@@ -100,8 +106,15 @@ def install(app: FastAPI, answer: Answer = answer) -> None:
         DBAPIError,
         PoolTimeoutError,
         ClientDisconnect,
+        OSError,
     ):
         app.add_exception_handler(kind, handler)
+
+
+def _is_full(error: Exception) -> bool:
+    if isinstance(error, OSError):
+        return error.errno in (errno.ENOSPC, errno.EDQUOT)
+    return isinstance(error, DBAPIError) and is_full(error)
 
 
 def _invalid(errors: Sequence[Any]) -> Refusal:

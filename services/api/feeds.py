@@ -26,8 +26,6 @@ from services.database.tables import events, jobs
 
 TICK_SECONDS = 0.25
 HEARTBEAT_SECONDS = 15.0
-LISTENERS = 1000
-"""Of one process at most."""
 
 _KEPT = 1000
 _PAGE = 500

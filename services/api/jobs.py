@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Callable
 from typing import Annotated, Any
 
 from anyio import to_thread
@@ -14,11 +13,12 @@ from schemas.service import JobRecord, KeyRecord, SceneRecord, TaskRecord
 from services.acceptance import accept
 from services.api.answers import EventPage, JobPage, TaskPage
 from services.api.body import JsonBody
-from services.api.feeds import LISTENERS, Feeds
+from services.api.bounds import most_jobs, require_within
+from services.api.feeds import Feeds
 from services.api.pages import LINK_HEADER, MOMENT, TASK_PLACE, Page
 from services.api.parts import JobId, NameQuery, Services
 from services.api.places import moment, position
-from services.api.security import Caller, Needs, require_scope
+from services.api.security import Caller, Needs, require_own, require_scope
 from services.api.streams import EventStream
 from services.database import tables
 from services.keys import allows
@@ -57,10 +57,12 @@ def submit_job(
     """Submits a job."""
     scenes = _require_accepted(service, body)
     spec = _within_scope(body, caller)
+    require_within(spec, scenes, caller, service.settings)
     named: dict[str, Any] = {"submitted_by": caller.id, "idempotency_key": idempotency_key}
     record, new = service.jobs.repeated(spec, **named), False
     if record is None:
         accepted = accept(spec, scenes, service.registry, service.measured, service.storage.store)
+        named["most"] = most_jobs(caller, service.settings)
         record, new = service.jobs.submit(spec, **named, request_id=request.state.request_id, accepted=accepted)
     response.headers["Location"] = f"/v1/jobs/{record.id}"
     response.status_code = 202 if new else 200
@@ -71,8 +73,10 @@ def _within_scope(spec: JobSpec, key: KeyRecord) -> JobSpec:
     """What a key may ask for: without the scope `publish`, a better version stays a candidate.
 
     Raises:
-        Refusal: A promotion is asked for in so many words, and the key may not.
+        Refusal: A promotion is asked for in so many words, or to be served before all others, and the key may not.
     """
+    if spec.priority == "high":
+        require_scope(key, "admin")
     if spec.kind != "build" or spec.promote == "never" or allows(key, "publish"):
         return spec
     if "promote" in spec.model_fields_set:
@@ -101,15 +105,17 @@ def read_job(job_id: JobId, service: Services) -> JobRecord:
 
 
 @router.post("/{job_id}/cancel", dependencies=_submit, responses={409: {}})
-def cancel_job(job_id: JobId, service: Services) -> JobRecord:
-    """Cancels a job: what runs is stopped, what was made stays."""
+def cancel_job(job_id: JobId, service: Services, caller: Caller) -> JobRecord:
+    """Cancels a job of the same key, or with `admin` any: what runs is stopped, what was made stays."""
+    require_own_job(service, caller, job_id)
     return service.jobs.cancel(job_id)
 
 
 @router.post("/{job_id}/retry", dependencies=_submit, responses={409: {}})
-def retry_job(job_id: JobId, service: Services) -> JobRecord:
-    """Goes on with a failed or cancelled job; what was made is found again."""
-    return service.jobs.retry(job_id)
+def retry_job(job_id: JobId, service: Services, caller: Caller) -> JobRecord:
+    """Goes on with a failed or cancelled job of the same key, or with `admin` any; what was made is found again."""
+    require_own_job(service, caller, job_id)
+    return service.jobs.retry(job_id, most=most_jobs(caller, service.settings))
 
 
 @router.get("/{job_id}/tasks", responses={200: {"headers": LINK_HEADER}})
@@ -154,7 +160,7 @@ async def read_events(
 ) -> EventPage | Response:
     """What happened in a job, as a page or as server-sent events."""
     if "text/event-stream" in accept:
-        return await stream_events(request.app.state.feeds, job_id, last_number(last_event_id, after))
+        return await stream_events(request, job_id, last_number(last_event_id, after))
     await to_thread.run_sync(service.jobs.get, job_id)
     found = await to_thread.run_sync(service.jobs.events, job_id, after, limit + 1)
     items = list(found[:limit])
@@ -164,31 +170,35 @@ async def read_events(
     return EventPage(items=items)
 
 
-async def stream_events(
-    feeds: Feeds, job_id: str, after: int, wrap: Callable[[AsyncIterator[bytes]], AsyncIterator[bytes]] | None = None
-) -> Response:
-    """The events of a job as they happen.
+async def stream_events(request: Request, job_id: str, after: int) -> Response:
+    """The events of a job as they happen, for as long as the key of the request is valid.
 
     Args:
-        feeds: All feeds.
+        request: The request.
         job_id: The job.
         after: Number of the last event that the listener has.
-        wrap: Put around the source, where the stream may have to end before the job does.
 
     Raises:
         Problem: There is no such job.
-        Refusal: Too many listen already.
     """
+    feeds: Feeds = request.app.state.feeds
     state = await to_thread.run_sync(feeds.state, job_id)
     if state is None:
         raise Problem(f"There is no job {job_id}.", "List the jobs.", ExitCode.NOT_FOUND)
     last, final = state
     if final and after >= last:
         return Response(status_code=204)  # to a browser this says that it need not connect again
-    if feeds.listeners >= LISTENERS:
-        raise Refusal("unavailable", f"{LISTENERS} listeners are connected already.")
-    source = feeds.listen(job_id, after, state)
-    return EventStream(source if wrap is None else wrap(source))
+    return EventStream(feeds.listen(job_id, after, state))
+
+
+def require_own_job(service: Service, key: KeyRecord, job_id: str) -> None:
+    """Refuses a key that would change the job of another one.
+
+    Raises:
+        Problem: There is no such job.
+        Refusal: It belongs to another key.
+    """
+    require_own(key, service.jobs.get(job_id).submitted_by, f"The job {job_id}")
 
 
 def last_number(header: str, after: int) -> int:

@@ -29,7 +29,7 @@ def create_key(body: Annotated[NewKey, Depends(JsonBody(NewKey))], service: Serv
     expires = body.expires
     if expires is not None:
         expires = expires if expires.tzinfo else expires.replace(tzinfo=UTC)
-    key, secret = service.keys.create(body.name, body.scopes, expires.timestamp() if expires else None)
+    key, secret = service.keys.create(body.name, body.scopes, expires.timestamp() if expires else None, body.bounds)
     response.headers["Cache-Control"] = "no-store"
     return CreatedKey(key=key, secret=secret)
 

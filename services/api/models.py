@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Request, Response
 
 from schemas.problem import ExitCode, Problem
-from schemas.service import ModelRecord, VersionRecord
+from schemas.service import ModelRecord, PointerRecord, VersionRecord
 from services.api.answers import AliasesRecord, ModelPage, Move, Reasoned, SigningKeys, VersionPage
 from services.api.body import JsonBody
 from services.api.etags import is_current
@@ -60,13 +60,20 @@ def list_versions(name: NamePath, service: Services, paging: Page) -> VersionPag
     openapi_extra=_IF_NONE_MATCH,
 )
 def read_version(name: NamePath, version: VersionPath, request: Request, service: Services) -> Response:
-    """A version, by number or alias. Its ETag lets clients ask often whether an alias has moved."""
+    """A version, by number or alias; what an alias means is signed in its pointer alone."""
     content = service.registry.record(service.registry.resolve(f"{name}@{version}")).model_dump_json().encode()
     tag = hashlib.sha256(content).hexdigest()
     headers = {"ETag": f'"{tag}"'}
     if is_current(request, tag):
         return Response(status_code=304, headers=headers)
     return Response(content, media_type="application/json", headers=headers)
+
+
+@router.get("/models/{name}/pointers/{version}")
+def read_pointer(name: NamePath, version: VersionPath, service: Services, response: Response) -> PointerRecord:
+    """What an alias means now, signed, until it expires. Nothing in between may keep it."""
+    response.headers["Cache-Control"] = "no-store"
+    return service.registry.pointer(name, version)
 
 
 @router.get("/models/{name}/aliases")
@@ -99,7 +106,7 @@ def roll_back_alias(
 
 @router.get("/signing-keys")
 def list_signing_keys(service: Services) -> SigningKeys:
-    """Public keys that versions are signed with; a client pins them."""
+    """The public key that versions and aliases are signed with, then those before it; a client pins the first."""
     return SigningKeys(keys=service.registry.public_keys())
 
 

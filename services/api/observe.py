@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import time
 import uuid
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from http import HTTPStatus
 from traceback import format_exception
 from typing import Any
 
@@ -48,12 +49,20 @@ class Observe:
         hosts: Names that the server answers for; `*`: any.
         window: Seconds in which a key's bucket fills, as the RateLimit headers tell it.
         burst: Requests that a bucket holds.
+        note_full: Told when a request met a disk that is full.
     """
 
     def __init__(
-        self, app: ASGIApp, metrics: Metrics, answer: Answer, hosts: Sequence[str], window: float, burst: int
+        self,
+        app: ASGIApp,
+        metrics: Metrics,
+        answer: Answer,
+        hosts: Sequence[str],
+        window: float,
+        burst: int,
+        note_full: Callable[[], None],
     ) -> None:
-        self._app, self._metrics, self.answer = app, metrics, answer
+        self._app, self._metrics, self.answer, self._note_full = app, metrics, answer, note_full
         self._hosts = None if "*" in hosts else frozenset(host.lower() for host in hosts)
         self._policy = f'"key";q={burst};w={max(1, round(window))}'
 
@@ -71,6 +80,8 @@ class Observe:
 
     def count(self, method: str, scope: Scope, status: int, seconds: float, size: int) -> None:
         """See `Metrics.count`."""
+        if status == HTTPStatus.INSUFFICIENT_STORAGE:
+            self._note_full()
         route = getattr(scope.get("route"), "path", "other")
         self._metrics.count(method if method in _METHODS else "other", route, status, seconds, size)
 

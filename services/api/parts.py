@@ -23,7 +23,7 @@ UploadId = Annotated[str, Path(pattern=r"^upl_[0-9a-f]{24}$")]
 KeyId = Annotated[str, Path(pattern=r"^key_[0-9a-f]{12}$")]
 BlobHash = Annotated[str, Path(pattern=r"^[0-9a-f]{64}$")]
 NamePath = Annotated[str, Path(pattern=r"^[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?$")]
-AliasPath = Annotated[str, Path(pattern=r"^[a-z][a-z0-9-]{0,39}$")]
+AliasPath = Annotated[str, Path(pattern=r"^[a-z](?:[a-z0-9-]{0,38}[a-z0-9])?$")]
 VersionPath = Annotated[str, Path(pattern=r"^[A-Za-z0-9][A-Za-z0-9.-]{0,39}$")]
 
 PRINTED = r"^[^\x00-\x1f\x7f]*$"

@@ -2,37 +2,44 @@
 
 from __future__ import annotations
 
-import hashlib
+import ipaddress
 import math
-from collections import OrderedDict
 from collections.abc import Callable
 from typing import Annotated
 
 from fastapi import Depends, Request
 
 from schemas.service import KeyRecord, Scope
+from services.api.leases import Holder
+from services.api.ledger import Ledger
 from services.api.rate import Allowance, Buckets
-from services.keys import Keys, allows
+from services.database import Database
+from services.keys import Found, Keys, allows
 from services.problems import Refusal
 
-_KNOWN = 10_000
 _FAILURES_PER_BURST = 4
+_NETWORK = 64
+"""Bits of an IPv6 address that one user has: a home or a machine is given all that are left."""
 
 
 class Guard:
     """Authenticates requests; the default dependency of every route that is not on the short list of open ones.
 
+    Whoever is right is never refused for what others at the same address got wrong: secrets have 256 random bits, so
+    that counting failures protects no key. It only tells a client that guesses to stop.
+
     Args:
         keys: The keys.
         rate: Requests a second of a key, on average.
-        burst: Requests of a key at once. An address may be wrong a quarter as often.
+        burst: Requests of a key at once. An address may guess a quarter as often.
+        database: What the processes of a service settle both through.
     """
 
-    def __init__(self, keys: Keys, rate: float, burst: int) -> None:
+    def __init__(self, keys: Keys, rate: float, burst: int, database: Database) -> None:
         self._keys = keys
-        self.requests = Buckets(rate, burst)
-        self.failures = Buckets(rate / _FAILURES_PER_BURST, max(1, burst // _FAILURES_PER_BURST))
-        self._known: OrderedDict[str, None] = OrderedDict()
+        self.requests = Buckets(rate, burst, Ledger(database, "key"))
+        guesses = max(1, burst // _FAILURES_PER_BURST)
+        self.failures = Buckets(rate / _FAILURES_PER_BURST, guesses, Ledger(database, "address"))
 
     def __call__(self, request: Request) -> KeyRecord:
         """The key of a request, also in `request.state.key`.
@@ -55,39 +62,34 @@ class Guard:
             require_scope(key, "read")
         return key
 
-    def admit(self, request: Request, secret: str, find: Callable[[str], KeyRecord | None]) -> KeyRecord | None:
+    def admit(self, request: Request, secret: str, find: Callable[[str], Found], session: str = "") -> KeyRecord | None:
         """The key that a secret stands for, also in `request.state.key`; None if it stands for none.
 
         Args:
             request: The request.
             secret: A key's secret or a session's token; empty: none was sent.
-            find: Tells the key of a secret.
+            find: Tells what a secret stands for.
+            session: What is kept of a session's token; empty: it is a key's secret.
 
         Raises:
-            Refusal: The key, or the address with secrets that stand for none, asks too often.
+            Refusal: The key asks too often, or the address guesses too often.
         """
-        address = request.client.host if request.client else ""
-        name = hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()
-        # An address that was wrong too often is not heard any more, but for keys that were right before: others may
-        # share the address.
-        if name not in self._known:
-            _require(self.failures.take(address, 0.0), "This address sent too many wrong keys.")
-        key = find(secret) if secret else None
+        found = find(secret) if secret else Found(None)
+        if found.is_guess:
+            _require(self.failures.take(address_of(request)), "This address sent too many keys that there are not.")
+        key = found.key
         if key is None:
-            self._known.pop(name, None)
-            self.failures.take(address)
             return None
-        self._remember(name)
         allowance = self.requests.take(key.id)
         request.state.allowance = allowance
         _require(allowance, f"The key may send {self.requests.rate:g} requests a second on average.")
-        request.state.key = key
+        request.state.key, request.state.holder = key, Holder(key.id, session)
         return key
 
-    def _remember(self, name: str) -> None:
-        self._known[name] = None
-        if len(self._known) > _KNOWN:
-            self._known.popitem(last=False)
+    def settle(self) -> None:
+        """Writes down what this process alone knows of who has sent how much."""
+        self.requests.settle()
+        self.failures.settle()
 
 
 class Needs:
@@ -117,6 +119,40 @@ def require_scope(key: KeyRecord, scope: Scope) -> None:
     """
     if not allows(key, scope):
         raise Refusal("forbidden", f"The key {key.id} lacks the scope '{scope}'.")
+
+
+def is_own(key: KeyRecord, made_by: str) -> bool:
+    """Whether a key may change what another request made: its own, or everything with the scope `admin`."""
+    return made_by == key.id or allows(key, "admin")
+
+
+def require_own(key: KeyRecord, made_by: str, what: str) -> None:
+    """Refuses a key that would change what another key made.
+
+    Args:
+        key: The key.
+        made_by: Id of the key that made it.
+        what: What it is, to be told.
+
+    Raises:
+        Refusal: It belongs to another key.
+    """
+    if not is_own(key, made_by):
+        raise Refusal("not-own", f"{what} belongs to another key than {key.id}.")
+
+
+def address_of(request: Request) -> str:
+    """Whom an address stands for: itself, or of IPv6 the network that one user has."""
+    text = request.client.host if request.client else ""
+    try:
+        address = ipaddress.ip_address(text)
+    except ValueError:
+        return text[:64]
+    if isinstance(address, ipaddress.IPv4Address):
+        return str(address)
+    if address.ipv4_mapped is not None:
+        return str(address.ipv4_mapped)
+    return str(ipaddress.ip_network((address, _NETWORK), strict=False))
 
 
 async def _key_of(request: Request) -> KeyRecord:

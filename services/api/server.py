@@ -16,6 +16,7 @@ from fastapi import FastAPI
 from services.api.application import create_app
 from services.api.feeds import Feeds
 from services.api.observe import LOOPBACK
+from services.api.protocol import BoundedProtocol
 from services.service import Service
 
 DRAIN_SECONDS = 5
@@ -61,16 +62,27 @@ def make_server(service: Service, host: str, port: int, hosts: Sequence[str] = (
             address no others, on any other address all, because there a name cannot be guessed.
     """
     names = (*LOOPBACK, *hosts) if hosts or is_loopback(host) else ("*",)
-    return server_of(create_app(service, hosts=names), host, port)
+    return server_of(create_app(service, hosts=names), host, port, service.settings.trusted_proxies)
 
 
-def server_of(app: FastAPI, host: str, port: int) -> Server:
-    """A server of an application; see `make_server`."""
+def server_of(app: FastAPI, host: str, port: int, proxies: Sequence[str] = ()) -> Server:
+    """A server of an application; see `make_server`.
+
+    Args:
+        app: The application.
+        host: Address that it listens on.
+        port: Port; 0: a free one.
+        proxies: Addresses and networks of proxies whose `X-Forwarded-For` and `X-Forwarded-Proto` are believed.
+    """
     config = uvicorn.Config(
         app,
         host=host,
         port=port,
+        http=BoundedProtocol,
         ws="none",
+        # What others say of who asks is believed of the proxies alone that an operator named.
+        proxy_headers=bool(proxies),
+        forwarded_allow_ips=list(proxies),
         access_log=False,  # the application writes its own
         log_config=None,
         server_header=False,

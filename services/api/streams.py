@@ -13,10 +13,13 @@ from anyio import to_thread
 from starlette.responses import Response
 from starlette.types import Receive, Scope, Send
 
+from schemas.limits import LIMITS
+from services.api.leases import Holder, Leases, revocable
+
 CHUNK = 1 << 20
 """Bytes of a file that are read and sent at once: enough that system calls and hand-overs cost little."""
 
-STALL_SECONDS = 60.0
+STALL_SECONDS = LIMITS.send_stall_seconds
 """A client that takes nothing for so long is given up."""
 
 
@@ -35,21 +38,30 @@ class EventStream(Response):
         self._source: Any = source
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Sends the events."""
-        async with anyio.create_task_group() as group, aclosing(self._source) as source:
+        """Sends the events, while the key and the session are valid that they are for."""
+        leases: Leases = scope["app"].state.leases
+        holder: Holder = scope["state"]["holder"]
+        with leases.listen(holder):
+            async with anyio.create_task_group() as group:
 
-            async def watch() -> None:
-                while (await receive())["type"] != "http.disconnect":
-                    pass
+                async def watch() -> None:
+                    while (await receive())["type"] != "http.disconnect":
+                        pass
+                    group.cancel_scope.cancel()
+
+                await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+                group.start_soon(watch)
+                with revocable(scope, ends_in_doubt=bool(holder.session)):
+                    await self._relay(send)
+                with anyio.fail_after(STALL_SECONDS):
+                    await send({"type": "http.response.body", "body": b"", "more_body": False})
                 group.cancel_scope.cancel()
 
-            await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
-            group.start_soon(watch)
+    async def _relay(self, send: Send) -> None:
+        async with aclosing(self._source) as source:
             async for text in source:
                 with anyio.fail_after(STALL_SECONDS):
                     await send({"type": "http.response.body", "body": text, "more_body": True})
-            await send({"type": "http.response.body", "body": b"", "more_body": False})
-            group.cancel_scope.cancel()
 
 
 class FileRange(Response):
@@ -70,7 +82,14 @@ class FileRange(Response):
         self._path, self._start, self._end = path, start, end
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Sends the bytes; reading happens in threads of its own, so that a slow disk holds up nothing else."""
+        """Sends the bytes; reading happens in threads of its own, so that a slow disk holds up nothing else.
+
+        Where the key is revoked meanwhile, the answer stays without its end, and the server closes the connection.
+        """
+        with revocable(scope):
+            await self._send(send)
+
+    async def _send(self, send: Send) -> None:
         stream: IO[bytes] = await to_thread.run_sync(self._path.open, "rb", 0)
         try:
             await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})

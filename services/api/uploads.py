@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Annotated
@@ -14,12 +15,18 @@ from schemas.limits import LIMITS
 from services.api.answers import NewUpload, UploadState
 from services.api.body import JsonBody, read_body, require_type
 from services.api.parts import Services, UploadId
-from services.api.security import Caller, Needs
+from services.api.security import Caller, Needs, require_own
 from services.problems import Refusal
 from services.uploads import Upload
 
 IN_MEMORY_BYTES = 16 * LIMITS.part_bytes
 """Of all parts that are being received at once."""
+
+KEY_BYTES = IN_MEMORY_BYTES // 4
+"""Of the parts of one key."""
+
+_LEAST_BYTES = 1 << 20
+"""Set aside for any part, so that their number is bounded as well."""
 
 router = APIRouter(prefix="/v1/uploads", tags=["uploads"])
 _submit = [Depends(Needs("submit"))]
@@ -60,17 +67,21 @@ async def append_part(
     upload_offset: Annotated[int, Header(ge=0, le=LIMITS.upload_bytes)],
     request: Request,
     service: Services,
+    caller: Caller,
 ) -> UploadState:
     """Appends a part; the last one completes the upload if the hash holds."""
     require_type(request, "application/octet-stream")
-    with _memory(request):
+    upload = await to_thread.run_sync(service.uploads.get, upload_id)  # before anything is set aside for it
+    require_own(caller, upload.made_by, f"The upload {upload_id}")
+    with _memory(request, caller.id):
         data = await read_body(request, LIMITS.part_bytes)
         return _state(await to_thread.run_sync(service.uploads.append, upload_id, upload_offset, data))
 
 
 @router.delete("/{upload_id}", status_code=204, dependencies=_submit)
-def delete_upload(upload_id: UploadId, service: Services) -> None:
+def delete_upload(upload_id: UploadId, service: Services, caller: Caller) -> None:
     """Gives an upload up."""
+    require_own(caller, service.uploads.get(upload_id).made_by, f"The upload {upload_id}")
     service.uploads.delete(upload_id)
 
 
@@ -79,36 +90,45 @@ def _state(upload: Upload) -> UploadState:
 
 
 class _Memory:
-    """Bytes that parts under way may take together."""
+    """Bytes that parts under way may take, all together and those of one key."""
 
-    def __init__(self, size: int) -> None:
-        self._free, self._lock = size, threading.Lock()
+    def __init__(self, size: int, share: int) -> None:
+        self._free, self._share = size, share
+        self._taken: Counter[str] = Counter()
+        self._lock = threading.Lock()
 
     @contextmanager
-    def take(self, size: int) -> Iterator[None]:
+    def take(self, size: int, key_id: str) -> Iterator[None]:
         """Sets bytes aside.
 
         Raises:
             Refusal: There are not as many.
         """
         with self._lock:
+            if self._taken[key_id] + size > self._share:
+                raise Refusal("unavailable", "The key sends too many parts of uploads at once.", headers=_AGAIN)
             if size > self._free:
-                raise Refusal("unavailable", "Too many parts of uploads are being received at once.")
+                raise Refusal("unavailable", "Too many parts of uploads are being received at once.", headers=_AGAIN)
             self._free -= size
+            self._taken[key_id] += size
         try:
             yield
         finally:
             with self._lock:
                 self._free += size
+                self._taken[key_id] -= size
+                if not self._taken[key_id]:
+                    del self._taken[key_id]
 
 
-_parts = _Memory(IN_MEMORY_BYTES)
+_parts = _Memory(IN_MEMORY_BYTES, KEY_BYTES)
+_AGAIN = {"Retry-After": "2"}
 
 
 @contextmanager
-def _memory(request: Request) -> Iterator[None]:
+def _memory(request: Request, key_id: str) -> Iterator[None]:
     """Memory for the body of a request: as announced, else as much as there may be."""
     announced = request.headers.get("content-length", "")
     size = int(announced[:20]) if announced.isdecimal() else LIMITS.part_bytes
-    with _parts.take(min(size, LIMITS.part_bytes)):
+    with _parts.take(max(_LEAST_BYTES, min(size, LIMITS.part_bytes)), key_id):
         yield

@@ -33,7 +33,7 @@ PATTERNS: Final[Mapping[str, str]] = {
     r"^(?:[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?)?$": "a name: at most 63 small letters, digits and inner hyphens",
     r"^[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?(?:@[A-Za-z0-9.-]{1,40})?$": "NAME, NAME@ALIAS or NAME@VERSION",
     r"^(?:[a-z0-9-]{1,63}@[A-Za-z0-9.-]{1,40})?$": "NAME@VERSION, or empty",
-    r"^[a-z][a-z0-9-]{0,39}$": "an alias: a small letter, then at most 39 small letters, digits and hyphens",
+    r"^[a-z](?:[a-z0-9-]{0,38}[a-z0-9])?$": "an alias: 1 to 40 small letters, digits and inner hyphens, a letter first",
     r"^[A-Za-z0-9][A-Za-z0-9.-]{0,39}$": "a version or an alias: at most 40 letters, digits, points and hyphens",
     r"^(?:[A-Za-z0-9][A-Za-z0-9.-]{0,39})?$": "a version: at most 40 letters, digits, points and hyphens, or empty",
     r"^[A-Za-z0-9@.:+-]{0,140}$": "exact, TECHNIQUE:BUDGET or NAME@VERSION:BUDGET",
@@ -43,6 +43,7 @@ PATTERNS: Final[Mapping[str, str]] = {
 _TYPES: Final[Mapping[str, str]] = {
     "missing": "is missing",
     "extra_forbidden": "is nothing that is known here",
+    "given_twice": "is given twice",
     "string_type": "has to be text",
     "int_type": "has to be a whole number",
     "int_parsing": "has to be a whole number",

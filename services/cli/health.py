@@ -96,7 +96,8 @@ def _is_heard(settings: Settings, role: str) -> bool:
     import sqlalchemy as sa
 
     from services.database import Database, tables
-    from services.engine.liveness import clock, host
+    from services.database.clock import clock
+    from services.engine.liveness import host
 
     database, table = Database(settings.database_url), tables.executors
     try:

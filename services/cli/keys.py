@@ -1,7 +1,8 @@
-"""`diaphane keys`: who may use a server."""
+"""`diaphane keys`: who may use a server, and what it signs with."""
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,7 +21,10 @@ from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
 if TYPE_CHECKING:
     from services.keys import Keys
 
-app = typer.Typer(help="API keys: create, list, revoke. Needs an admin key, or --local.", no_args_is_help=True)
+app = typer.Typer(
+    help="API keys: create, list, revoke (needs an admin key, or --local); the signing key: rotate.",
+    no_args_is_help=True,
+)
 
 LocalOption = Annotated[
     bool, typer.Option("--local", help="Without a server: in the database of the state folder, or DIAPHANE_DATABASE.")
@@ -34,6 +38,15 @@ def create(
     name: Annotated[str, typer.Argument(help="Who or what it is for.")],
     scope: Annotated[list[str], typer.Option("--scope", help="read, submit, publish or admin; repeatable.")],
     days: Annotated[float | None, typer.Option("--days", help="Days until it expires. Default: never.")] = None,
+    job_pixels: Annotated[
+        int | None, typer.Option("--job-pixels", min=1, help="Pixels of all views of a job. Default: the service's.")
+    ] = None,
+    job_steps: Annotated[
+        int | None, typer.Option("--job-steps", min=1, help="Optimiser steps of a job. Default: the service's.")
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", min=1, help="Jobs that have not ended. Default: the service's.")
+    ] = None,
     is_local: LocalOption = False,
     state: StateOption = DEFAULT_STATE,
     url: UrlOption = DEFAULT_URL,
@@ -47,13 +60,16 @@ def create(
     if days is not None and not 0.0 < days <= 36500.0:
         raise Problem(f"--days {days:g} is not above 0 and at most 36500.", "Change that option.")
     expires = None if days is None else time.time() + days * _DAY_SECONDS
+    bounds = {"job_pixels": job_pixels, "job_steps": job_steps, "jobs": jobs}
     if is_local:
+        from schemas.service import JobBounds
+
         with _local(state) as keys:
-            record, secret = keys.create(name, scope, expires)  # type: ignore[arg-type]  # checked above
+            record, secret = keys.create(name, scope, expires, JobBounds(**bounds))  # type: ignore[arg-type]  # checked
         made: dict[str, Any] = {"key": record.model_dump(mode="json"), "secret": secret}
     else:
         moment = None if expires is None else datetime.fromtimestamp(expires, UTC).isoformat(timespec="seconds")
-        made = connect(url, key_file).create_key(name, scope, moment)
+        made = connect(url, key_file).create_key(name, scope, moment, bounds)
     if as_json:
         output.print_json(made)
         return
@@ -97,6 +113,57 @@ def revoke(
     else:
         connect(url, key_file).revoke_key(key_id)
     print(f"{key_id} is revoked.")
+
+
+@app.command("rotate-signing")
+def rotate_signing(
+    new_key: Annotated[
+        Path | None,
+        typer.Option(
+            "--new-key", help="File with the new key, 32 random bytes in base64; -: stdin. Default: made here."
+        ),
+    ] = None,
+    is_lost: Annotated[
+        bool,
+        typer.Option(
+            "--lost", help="The old key is gone: sign with the present one, which every client has to be told of."
+        ),
+    ] = False,
+    state: StateOption = DEFAULT_STATE,
+    as_json: JsonOption = False,
+) -> None:
+    """Hand over to a new signing key, in the database of the state folder, or DIAPHANE_DATABASE."""
+    # Imported late: `diaphane --help` needs no database.
+    from services.database import open_database
+    from services.registry import handovers
+    from services.registry.signing import decoded_seed, read_seed
+    from services.settings import Settings
+
+    if is_lost and new_key is not None:
+        raise Problem("--lost takes the present key, and no --new-key.", "Put the new key in its place, then repeat.")
+    seed = None
+    if str(new_key) == "-":
+        seed = decoded_seed(sys.stdin.read(), "Standard input")
+    elif new_key is not None:
+        if not new_key.is_file():
+            raise Problem(f"There is no file {new_key}.", "Make it: `openssl rand -base64 32 > new.key`.")
+        seed = read_seed(new_key)
+    settings = Settings(state=state)
+    database = open_database(settings.database_url)
+    try:
+        done = handovers.replace_lost(database, settings) if is_lost else handovers.rotate(database, settings, seed)
+    finally:
+        database.close()
+    if as_json:
+        output.print_json({"public_key": done.public_key, "signed": done.signed, "left": list(done.left)})
+        return
+    print(done.public_key)
+    say = output.err()
+    say.print(f"The registry's public key; {done.signed} versions are signed with it.", markup=False)
+    for reference in done.left:
+        say.print(f"warning: {reference} had no right signature, and was left as it is.", markup=False)
+    if settings.signing_key and not is_lost:
+        say.print("Start every process that signs with the new key as DIAPHANE_SIGNING_KEY.", markup=False)
 
 
 @contextmanager

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from services.visible import visible
+
 
 def plain(text: Any) -> str:
     """Text of somebody else on one line, without what a terminal would take for commands."""
-    return "".join(c if c.isprintable() else " " for c in str(text)).strip()
+    return "".join(" " if sign.isspace() else sign for sign in visible(str(text))).strip()
 
 
 def print_columns(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:

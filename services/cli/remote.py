@@ -263,9 +263,11 @@ class Remote:
 
     # Keys and workers
 
-    def create_key(self, name: str, scopes: Sequence[str], expires: str | None) -> JSON:
+    def create_key(
+        self, name: str, scopes: Sequence[str], expires: str | None, bounds: Mapping[str, int | None]
+    ) -> JSON:
         """Makes a key; its secret is in this answer and nowhere else."""
-        body = {"name": name, "scopes": list(scopes), "expires": expires}
+        body = {"name": name, "scopes": list(scopes), "expires": expires, "bounds": dict(bounds)}
         return self._json("POST", "/v1/keys", json=body, repeatable=False)
 
     def keys(self) -> Iterator[JSON]:

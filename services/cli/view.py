@@ -58,6 +58,10 @@ def view(
     watch: Annotated[
         bool, typer.Option("--watch", help="Take every bundle that the alias of --model comes to mean.")
     ] = False,
+    public_key: Annotated[
+        str | None,
+        typer.Option("--public-key", help="Signing key of the server of --model, base64. Default: the first one seen."),
+    ] = None,
     inference: InferenceOption = "glsl",
     vkb: VkbOption = "",
     nodes: NodesOption = None,
@@ -113,6 +117,8 @@ def view(
         raise Problem("Both --model and --bundle name a bundle.", "Leave one of them out.")
     if watch and (model is None or frames is not None):
         raise Problem("--watch follows the alias of --model in a window.", "Give --model, and no --frames.")
+    if public_key is not None and model is None:
+        raise Problem("--public-key is that of the server of --model.", "Give --model, or leave it out.")
     has_bundle = model is not None or bundle is not None
     options = ViewerOptions(
         render=RenderOptions(
@@ -145,7 +151,7 @@ def view(
     if model is not None:
         from services.cli.remote import read_key
 
-        service = Service(model, url, read_key(key_file), state, watch)
+        service = Service(model, url, read_key(key_file), state, watch, public_key)
     from services.viewer.run import view as run
 
     rows = run(options, service, make_progress(sys.stderr, silent=as_json))

@@ -11,12 +11,13 @@ from functools import cache
 from pathlib import Path
 from typing import Annotated, Final
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Depends, Request, Response
 from fastapi import Path as InPath
 from fastapi.responses import JSONResponse
 
 from services.api import blobs, models
 from services.api.etags import is_current
+from services.api.parameters import require_known
 from services.dashboard.page import HEADERS
 from services.dashboard.visitor import COOKIE
 from services.problems import Refusal
@@ -25,7 +26,7 @@ BUILT: Final = Path(__file__).resolve().parent / "static" / "demo"
 """What `npm run build` in `deploy/client/web` writes."""
 
 open_router = APIRouter(prefix="/demo", include_in_schema=False)
-router = APIRouter(prefix="/demo/v1", include_in_schema=False)
+router = APIRouter(prefix="/demo/v1", include_in_schema=False, dependencies=[Depends(require_known)])
 """For scripts, by session: who has none is refused by a problem document, not sent to sign in."""
 
 _PAGE: Final = "index.html"
@@ -87,4 +88,5 @@ def _answer(request: Request, name: str, headers: dict[str, str]) -> Response:
 
 router.add_api_route("/models", models.list_models)
 router.add_api_route("/models/{name}/versions/{version}", models.read_version, response_model=None)
+router.add_api_route("/models/{name}/pointers/{version}", models.read_pointer)
 router.add_api_route("/blobs/sha256/{sha256}", blobs.read_blob, response_class=Response)

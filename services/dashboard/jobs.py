@@ -9,13 +9,13 @@ from fastapi import APIRouter, Depends, Header, Query, Request, Response
 
 from schemas.job import FINAL_STATES, JobKind, JobState, TaskState
 from schemas.service import EventRecord
-from services.api.jobs import last_number, stream_events
+from services.api.bounds import most_jobs
+from services.api.jobs import last_number, require_own_job, stream_events
 from services.api.pages import MOMENT, TASK_PLACE, Page
 from services.api.parts import JobId, Services
 from services.api.places import moment
-from services.api.security import Needs
+from services.api.security import Caller, Needs, is_own
 from services.api.streams import FileRange
-from services.dashboard.live import while_signed_in
 from services.dashboard.page import PageRoute, redirect, render
 from services.dashboard.stages import graph
 from services.dashboard.visitor import FormBody, NoFields
@@ -78,6 +78,7 @@ def show_job(
     request: Request,
     job_id: JobId,
     service: Services,
+    caller: Caller,
     paging: Page,
     stage: Annotated[str, Query(pattern=r"^[a-z]{0,32}$")] = "",
     state: TaskState | Literal[""] = "",
@@ -86,6 +87,7 @@ def show_job(
     """A job; the query chooses among its tasks, and until which event its log goes."""
     last, final = request.app.state.feeds.state(job_id) or (0, True)
     job = service.jobs.get(job_id)
+    is_mine = is_own(caller, job.submitted_by)
     positioned = service.jobs.positioned_tasks(
         job_id, stage=stage or None, state=state or None, limit=paging.fetch, after=paging.after(TASK_PLACE)
     )
@@ -106,8 +108,8 @@ def show_job(
         is_live=not final,
         key_names=service.keys.names({job.submitted_by}),
         address=f"{request.url.path}?{request.url.query}" if request.url.query else request.url.path,
-        can_retry=job.state in ("failed", "cancelled"),
-        can_cancel=job.state not in (*FINAL_STATES, "cancelling"),
+        can_retry=is_mine and job.state in ("failed", "cancelled"),
+        can_cancel=is_mine and job.state not in (*FINAL_STATES, "cancelling"),
     )
 
 
@@ -119,12 +121,7 @@ async def stream_job(
     last_event_id: Annotated[str, Header()] = "",
 ) -> Response:
     """Server-sent events: what happens in a job."""
-    return await stream_events(
-        request.app.state.feeds,
-        job_id,
-        last_number(last_event_id, after),
-        lambda source: while_signed_in(request, source),
-    )
+    return await stream_events(request, job_id, last_number(last_event_id, after))
 
 
 @router.get("/{job_id}/report", response_class=Response)
@@ -141,15 +138,17 @@ async def show_report(job_id: JobId, service: Services) -> Response:
 
 
 @router.post("/{job_id}/cancel", response_class=Response, dependencies=_submit)
-def cancel_job(job_id: JobId, service: Services, _: _Button) -> Response:
+def cancel_job(job_id: JobId, service: Services, caller: Caller, _: _Button) -> Response:
     """Cancels a job."""
+    require_own_job(service, caller, job_id)
     return redirect(f"/jobs/{service.jobs.cancel(job_id).id}")
 
 
 @router.post("/{job_id}/retry", response_class=Response, dependencies=_submit)
-def retry_job(job_id: JobId, service: Services, _: _Button) -> Response:
+def retry_job(job_id: JobId, service: Services, caller: Caller, _: _Button) -> Response:
     """Goes on with a failed or cancelled job."""
-    return redirect(f"/jobs/{service.jobs.retry(job_id).id}")
+    require_own_job(service, caller, job_id)
+    return redirect(f"/jobs/{service.jobs.retry(job_id, most=most_jobs(caller, service.settings)).id}")
 
 
 def _log(service: Service, job_id: str, until: int) -> list[Line]:

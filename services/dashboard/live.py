@@ -11,15 +11,11 @@ from collections.abc import AsyncIterator
 import sqlalchemy as sa
 import structlog
 from anyio import to_thread
-from fastapi import Request
 from sqlalchemy.exc import SQLAlchemyError
 
 from schemas.job import FINAL_STATES
-from services.api.feeds import HEARTBEAT_SECONDS, LISTENERS, Feeds
-from services.dashboard.sessions import Sessions
-from services.dashboard.visitor import COOKIE
+from services.api.feeds import HEARTBEAT_SECONDS, Feeds
 from services.database.tables import jobs, tasks
-from services.problems import Refusal
 from services.service import Service
 
 LOOK_SECONDS = 1.0
@@ -39,7 +35,6 @@ class Watch:
         self._service = service
         self._lock = threading.Lock()
         self._seen: tuple[float, str] = (float("-inf"), "")
-        self._listeners = 0
 
     def look(self) -> str:
         """What differs when anything of interest has changed; a query at most once a second."""
@@ -48,15 +43,6 @@ class Watch:
                 self._seen = (time.monotonic(), self._look())
             return self._seen[1]
 
-    def require_room(self) -> None:
-        """Refuses one more listener.
-
-        Raises:
-            Refusal: Too many listen already.
-        """
-        if self._listeners >= LISTENERS:
-            raise Refusal("unavailable", f"{LISTENERS} listeners are connected already.")
-
     async def changes(self, seen: str, feeds: Feeds) -> AsyncIterator[bytes]:
         """An event for each change, until the server stops.
 
@@ -64,25 +50,21 @@ class Watch:
             seen: What `look` said when the page was made.
             feeds: Know when the server stops.
         """
-        self._listeners += 1
-        try:
-            spoken = time.monotonic()
-            yield b": changes\n\n"
-            while not feeds.closed:
-                try:
-                    now = await to_thread.run_sync(self.look)
-                except SQLAlchemyError as error:
-                    log.warning("changes cannot be read", error=type(error).__name__)
-                    now = seen
-                if now != seen:
-                    seen, spoken = now, time.monotonic()
-                    yield b"event: change\ndata: {}\n\n"
-                elif time.monotonic() - spoken > HEARTBEAT_SECONDS:
-                    spoken = time.monotonic()
-                    yield b": still here\n\n"
-                await asyncio.sleep(LOOK_SECONDS)
-        finally:
-            self._listeners -= 1
+        spoken = time.monotonic()
+        yield b": changes\n\n"
+        while not feeds.closed:
+            try:
+                now = await to_thread.run_sync(self.look)
+            except SQLAlchemyError as error:
+                log.warning("changes cannot be read", error=type(error).__name__)
+                now = seen
+            if now != seen:
+                seen, spoken = now, time.monotonic()
+                yield b"event: change\ndata: {}\n\n"
+            elif time.monotonic() - spoken > HEARTBEAT_SECONDS:
+                spoken = time.monotonic()
+                yield b": still here\n\n"
+            await asyncio.sleep(LOOK_SECONDS)
 
     def _look(self) -> str:
         live = jobs.c.state.not_in(FINAL_STATES)
@@ -93,18 +75,3 @@ class Watch:
             far = connection.scalar(sa.select(sa.func.sum(tasks.c.progress)).where(moving))
         alive = [executor.id for executor in self._service.jobs.executors() if executor.alive]
         return hashlib.sha256(repr((sorted(found), far, sorted(alive))).encode()).hexdigest()[:16]
-
-
-async def while_signed_in(request: Request, source: AsyncIterator[bytes]) -> AsyncIterator[bytes]:
-    """A stream that ends soon after its session, or where nobody can tell of it: then the page asks, and says why."""
-    sessions: Sessions = request.app.state.sessions
-    token, checked = request.cookies[COOKIE], time.monotonic()
-    async for piece in source:
-        if time.monotonic() - checked >= HEARTBEAT_SECONDS:
-            checked = time.monotonic()
-            try:
-                if await to_thread.run_sync(sessions.find, token) is None:
-                    return
-            except SQLAlchemyError:
-                return
-        yield piece

@@ -9,20 +9,23 @@ from __future__ import annotations
 
 import hashlib
 import hmac
+import re
 import secrets
 import time
+from collections.abc import Collection
 
 import sqlalchemy as sa
 
 from schemas.service import KeyRecord
 from services.database import Database
 from services.database.tables import sessions as table
-from services.keys import Keys
+from services.keys import Found, Keys
 
 LIFETIME_SECONDS = 12 * 3600.0
 """After which one signs in again."""
 
 _PATIENCE_SECONDS = 5.0
+_TOKEN = re.compile(r"[A-Za-z0-9_-]{43}")
 
 
 class Sessions:
@@ -43,7 +46,7 @@ class Sessions:
             The token: 256 random bits.
         """
         token, now = secrets.token_urlsafe(32), time.time()
-        row = {"digest": _digest(token), "key_id": key.id, "created": now, "expires": now + LIFETIME_SECONDS}
+        row = {"digest": digest_of(token), "key_id": key.id, "created": now, "expires": now + LIFETIME_SECONDS}
 
         def body(connection: sa.Connection) -> None:
             connection.execute(table.delete().where(table.c.expires <= now))
@@ -53,16 +56,26 @@ class Sessions:
         self._database.retry(body, _PATIENCE_SECONDS)
         return token
 
-    def find(self, token: str) -> KeyRecord | None:
-        """The key that a token stands for; None if the session or its key has ended, or there was none."""
-        mine = (table.c.digest == _digest(token)) & (table.c.expires > time.time())
+    def find(self, token: str) -> Found:
+        """What a token stands for; nothing if the session or its key has ended, or there was none."""
+        if not _TOKEN.fullmatch(token):
+            return Found(None)
+        mine = table.c.digest == digest_of(token)
         with self._database.read() as connection:
-            key_id = connection.scalar(sa.select(table.c.key_id).where(mine))
-        return None if key_id is None else self._keys.alive(key_id)
+            row = connection.execute(sa.select(table.c.key_id, table.c.expires).where(mine)).first()
+        if row is None:
+            return Found(None, is_guess=True)
+        return Found(self._keys.alive(row.key_id) if row.expires > time.time() else None)
+
+    def valid(self, digests: Collection[str]) -> set[str]:
+        """Those of some tokens, as `digest_of`, whose sessions have not ended."""
+        mine = table.c.digest.in_(set(digests)) & (table.c.expires > time.time())
+        with self._database.read() as connection:
+            return set(connection.scalars(sa.select(table.c.digest).where(mine)))
 
     def close(self, token: str) -> None:
         """Ends a session; ending it again changes nothing."""
-        ended = table.delete().where(table.c.digest == _digest(token))
+        ended = table.delete().where(table.c.digest == digest_of(token))
         self._database.retry(lambda connection: connection.execute(ended), _PATIENCE_SECONDS)
 
 
@@ -71,5 +84,6 @@ def form_token(token: str) -> str:
     return hmac.new(token.encode(), b"diaphane form", hashlib.sha256).hexdigest()
 
 
-def _digest(token: str) -> str:
+def digest_of(token: str) -> str:
+    """What is kept of a token."""
     return hashlib.sha256(token.encode("utf-8", "surrogatepass")).hexdigest()

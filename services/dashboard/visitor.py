@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 from schemas.service import KeyRecord
 from services.api.body import read_body, require_type
 from services.api.security import Guard, require_scope
-from services.dashboard.sessions import LIFETIME_SECONDS, Sessions, form_token
+from services.dashboard.sessions import LIFETIME_SECONDS, Sessions, digest_of, form_token
 from services.problems import Refusal
 
 COOKIE = "diaphane_session"
@@ -44,7 +44,7 @@ class Visitor:
             Refusal: There is no session, it has ended, or its key asks too often.
         """
         token = request.cookies.get(COOKIE, "")
-        key = self._guard.admit(request, token, self._sessions.find) if token else None
+        key = self._guard.admit(request, token, self._sessions.find, digest_of(token)) if token else None
         if key is None:
             raise Refusal("unauthenticated", "The session has ended." if token else "Nobody is signed in.")
         require_scope(key, "read")

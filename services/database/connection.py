@@ -8,6 +8,9 @@ Rules:
 
 from __future__ import annotations
 
+import math
+import shutil
+import sqlite3
 import threading
 import time
 from collections import defaultdict
@@ -31,6 +34,7 @@ _writers: defaultdict[str, threading.Lock] = defaultdict(threading.Lock)
 """SQLite lets waiting writers try again at intervals, and some starve: those of a process take turns by a lock."""
 _OPTIONS = "-c statement_timeout=30000 -c idle_in_transaction_session_timeout=15000"
 """A process that is stopped in the middle of a transaction must not hold its locks for ever."""
+_DISK_FULL = "53100"
 _LOCK = 0x64696170  # of the migration, any number that nobody else uses
 
 
@@ -39,16 +43,26 @@ class Database:
 
     Args:
         url: `sqlite:///PATH` or `postgresql://...`.
+
+    Attributes:
+        waits_for_room: Whether `retry` also waits while the disk is full: who works does, who is asked says so.
     """
 
     def __init__(self, url: str) -> None:
         self.url = url
         self.engine = _engine(url)
+        self.waits_for_room = True
 
     @property
     def is_postgresql(self) -> bool:
         """Whether it is PostgreSQL, not SQLite."""
         return self.engine.dialect.name == "postgresql"
+
+    def free_bytes(self) -> float:
+        """What is left of the disk that SQLite writes to; of PostgreSQL's nobody here can tell."""
+        if self.is_postgresql:
+            return math.inf
+        return shutil.disk_usage(Path(str(self.engine.url.database)).parent).free
 
     @contextmanager
     def write(self) -> Iterator[sa.Connection]:
@@ -81,7 +95,11 @@ class Database:
                 with self.write() as connection:
                     return body(connection)
             except DBAPIError as error:
-                if not _is_passing(error) or time.monotonic() + wait > end:
+                if (
+                    (is_full(error) and not self.waits_for_room)
+                    or not _is_passing(error)
+                    or time.monotonic() + wait > end
+                ):
                     raise
                 time.sleep(wait)
                 wait = min(2.0, 2.0 * wait)
@@ -133,6 +151,13 @@ def open_database(url: str) -> Database:
     return database
 
 
+def is_full(error: DBAPIError) -> bool:
+    """Whether the database has no room left to write to."""
+    if getattr(error.orig, "sqlstate", None) == _DISK_FULL:
+        return True
+    return getattr(error.orig, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
+
+
 def _engine(url: str) -> sa.Engine:
     if url.startswith("sqlite:///"):
         # Scenes and hashes of keys are nobody else's business; a folder that exists keeps its rights.
@@ -178,7 +203,9 @@ def _commit(connection: sa.Connection) -> Iterator[None]:
     try:
         yield
     except BaseException:
-        connection.exec_driver_sql("ROLLBACK")
+        driver = connection.connection.driver_connection
+        if driver is not None and driver.in_transaction:  # a disk that is full ends it by itself
+            connection.exec_driver_sql("ROLLBACK")
         raise
     connection.exec_driver_sql("COMMIT")
 

@@ -6,7 +6,7 @@ from typing import Final
 
 import sqlalchemy as sa
 
-SCHEMA: Final = "1"
+SCHEMA: Final = "2"
 METADATA: Final = sa.MetaData()
 
 
@@ -38,8 +38,20 @@ keys = _table(
     sa.Column("expires", sa.Double),
     sa.Column("revoked", sa.Double),
     sa.Column("last_used", sa.Double),
+    sa.Column("job_pixels", sa.BigInteger),
+    sa.Column("job_steps", sa.BigInteger),
+    sa.Column("jobs", sa.BigInteger),
 )
-"""API keys: a hash of the secret, never the secret."""
+"""API keys: a hash of the secret, never the secret; and what their jobs may ask for, where that was set."""
+
+allowances = _table(
+    "allowances",
+    sa.Column("kind", sa.Text, primary_key=True),
+    sa.Column("name", sa.Text, primary_key=True),
+    sa.Column("level", sa.Double, nullable=False),
+    sa.Column("at", sa.Double, nullable=False),
+)
+"""Token buckets of the API's processes: tokens at a time of the database's clock; one that is missing is full."""
 
 sessions = _table(
     "sessions",
@@ -160,7 +172,7 @@ versions = _table(
     sa.UniqueConstraint("name", "digest"),
     sa.UniqueConstraint("name", "ordinal"),
 )
-"""Published versions; a row never changes."""
+"""Published versions; a row never changes, but for its signature when the signing key does."""
 
 aliases = _table(
     "aliases",
@@ -182,6 +194,17 @@ moves = _table(
     sa.Column("why", sa.Text, nullable=False),
 )
 """Every move of every alias."""
+
+handovers = _table(
+    "handovers",
+    sa.Column("id", sa.Integer, primary_key=True, autoincrement=True),
+    sa.Column("old_key", sa.Text, nullable=False),
+    sa.Column("new_key", sa.Text, nullable=False),
+    sa.Column("statement", sa.Text),
+    sa.Column("signature", sa.Text),
+    sa.Column("at", sa.Double, nullable=False),
+)
+"""Every change of the signing key; without a statement where the old key was lost."""
 
 measurements = _table(
     "measurements",

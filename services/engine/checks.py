@@ -1,4 +1,11 @@
-"""Checks of scenes that nobody does any more."""
+"""Checks of uploaded scenes: in a queue and slots of their own, so that no upload holds up a task, and fair by key.
+
+The waiting scenes of a key are its own queue, in the order in which they came. At most `checks_per_key` of them are
+among the workflows at once; the next one follows when one is done. So keys take turns, however many uploads each has
+waiting, and a key whose uploads take all the time that they may holds that many slots and no more.
+
+A check's workflows have the ids check/KEY/SCENE/NUMBER.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +16,12 @@ import sqlalchemy as sa
 
 from schemas.problem import ExitCode, Problem
 from services.database import Database, tables
-from services.engine import system
+from services.engine import queues, system
 from services.problems import document_of
 
 if TYPE_CHECKING:
+    from dbos import DBOSClient
+
     from services.engine.jobs import Jobs
 
 PAUSE_SECONDS = 5.0
@@ -20,25 +29,63 @@ TRIES = 3
 MOST = 100
 
 
+def prefix_of(key: str, scene_id: str = "") -> str:
+    """What the ids of workflows begin with, of all checks of a key or of those of one scene."""
+    return f"check/{key}/{scene_id}/" if scene_id else f"check/{key}/"
+
+
+def queue_next(connection: sa.Connection, database: Database, client: DBOSClient, key: str, at_once: int) -> None:
+    """Queues the next checks of a key; doing it again changes nothing while they wait or run.
+
+    Args:
+        connection: The caller's transaction.
+        database: The same database.
+        client: Queues workflows in it.
+        key: Id of the key that sent the scenes.
+        at_once: How many checks of a key wait in the queue, or run, at once.
+    """
+    table = tables.scenes
+    waiting = sa.select(table.c.id).where(table.c.created_by == key, table.c.state == "checking")
+    # The rows are held: of two processes that do this at once, the second sees what the first has queued.
+    ids = list(connection.scalars(waiting.order_by(table.c.created, table.c.id).limit(MOST).with_for_update()))
+    queued = {name.split("/")[2] for name in system.live_ids(connection, database, prefix_of(key))}
+    free = at_once - len(queued & set(ids))
+    for scene_id in ids:
+        if free <= 0:
+            return
+        prefix = prefix_of(key, scene_id)
+        tried = len(system.statuses(connection, database, prefix))
+        if scene_id not in queued and tried < TRIES:
+            name, free = f"{prefix}{tried}", free - 1
+            system.enqueue(client, connection, "check", name, queues.CHECKS, scene_id, priority=1)
+
+
 def see_to_adrift(database: Database, jobs: Jobs) -> None:
     """Queues checks again whose workflow failed or never came, and rejects a scene that took its checkers with it."""
     table = tables.scenes
-    waiting = sa.select(table.c.id).where(table.c.state == "checking", table.c.created < time.time() - PAUSE_SECONDS)
+    waiting = sa.select(table.c.id, table.c.created_by).where(
+        table.c.state == "checking", table.c.created < time.time() - PAUSE_SECONDS
+    )
     with database.read() as connection:
-        ids = list(connection.scalars(waiting.limit(MOST)))
-        found = {scene_id: system.statuses(connection, database, f"{scene_id}/") for scene_id in ids}
+        rows = connection.execute(waiting.order_by(table.c.created).limit(MOST)).all()
+        first = sa.select(sa.func.min(table.c.id)).where(table.c.state == "checking").group_by(table.c.created_by)
+        of_keys = list(connection.scalars(first))
+        found = {row.id: system.statuses(connection, database, prefix_of(row.created_by, row.id)) for row in rows}
     for scene_id, workflows in found.items():
-        if any(status in system.LIVE for _, status in workflows):
-            continue
-        if len(workflows) < TRIES:
-            jobs.check_scene(scene_id)
-            continue
-        problem = Problem(
-            f"The scene could not be checked within {TRIES} tries.",
-            "It probably exhausts the machine's memory: upload a simpler one.",
-            ExitCode.LIMIT,
-        )
-        values = {"state": "rejected", "problem": document_of(problem).model_dump(mode="json")}
-        with database.write() as connection:
-            here = [table.c.id == scene_id, table.c.state == "checking"]
-            connection.execute(table.update().where(*here).values(**values))
+        if len(workflows) >= TRIES and not any(status in system.LIVE for _, status in workflows):
+            _give_up(database, scene_id)
+    for scene_id in of_keys:
+        jobs.check_next(scene_id)
+
+
+def _give_up(database: Database, scene_id: str) -> None:
+    problem = Problem(
+        f"The scene could not be checked within {TRIES} tries.",
+        "It probably exhausts the machine's memory: upload a simpler one.",
+        ExitCode.LIMIT,
+    )
+    values = {"state": "rejected", "problem": document_of(problem).model_dump(mode="json")}
+    table = tables.scenes
+    with database.write() as connection:
+        here = [table.c.id == scene_id, table.c.state == "checking"]
+        connection.execute(table.update().where(*here).values(**values))

@@ -22,8 +22,9 @@ from typing import Any
 from renderer.gate.problems import RejectedScene
 from schemas.problem import Problem
 from services.engine.channel import Channel
+from services.engine.rooms import RoomStore
 from services.problems import summary_of
-from services.store import MissingArtifact, Store
+from services.store import MissingArtifact
 from services.tasks import Source, Task
 
 PR_SET_PDEATHSIG = 1
@@ -55,8 +56,8 @@ class _Bodies:
     def __init__(self, setup: dict[str, Any], channel: Channel) -> None:
         self._channel = channel
         self._make, self._inspect = setup["make"], setup["inspect"]
-        self._root = Path(setup["store"])
-        self._folders: dict[str, str] = {}
+        self._store = RoomStore(Path(setup["room"]), Path(setup["checkpoints"]))
+        self._sources = Path(setup["room"]) / "sources"
         self._told = 0.0
 
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -87,16 +88,15 @@ class _Bodies:
         return {"kind": "done", "facts": facts, "usage": usage}
 
     def _task(self, request: dict[str, Any]) -> None:
-        self._folders.update(request["folders"])
         make: Callable[..., None] = resolve(self._make)
-        make(Task.model_validate(request["task"]), Store(self._root), self._folder_of, self._report)
+        make(Task.model_validate(request["task"]), self._store, self._folder_of, self._report)
 
     def _check(self, request: dict[str, Any]) -> dict[str, Any]:
         inspect: Callable[[Path, str], dict[str, Any]] = resolve(self._inspect)
-        return inspect(Path(request["folder"]), request["root"])
+        return inspect(self._sources / request["source"], request["root"])
 
     def _folder_of(self, source: Source) -> Path:
-        return Path(source.folder) if source.folder is not None else Path(self._folders[source.digest])
+        return self._sources / source.digest
 
     def _report(self, fraction: float, note: str) -> None:
         now = time.monotonic()

@@ -1,7 +1,9 @@
 """The child processes of a worker: one for each slot, used again, killed when their task is lost or takes too long.
 
 A crash in a GL driver, an exhausted memory or a hang costs one task and not the worker. A child keeps its GL context
-and its imports from task to task. It has no secret in its environment and ends when its worker does, however that ends.
+and its imports from task to task of the same scene; it never meets two, so that what a scene does to it reaches no
+other one. It sees the files of its task (`services.engine.rooms`), has no secret in its environment, and ends when its
+worker does, however that ends.
 """
 
 from __future__ import annotations
@@ -9,7 +11,6 @@ from __future__ import annotations
 import os
 import queue
 import re
-import shutil
 import signal
 import socket
 import subprocess
@@ -28,6 +29,7 @@ from renderer.gate import RejectedScene
 from schemas.problem import ExitCode, Problem
 from services.engine import problems
 from services.engine.channel import Channel
+from services.engine.rooms import Room
 from services.store import MissingArtifact
 
 READY_SECONDS = 120.0
@@ -35,9 +37,9 @@ TICK_SECONDS = 0.2
 LINE_BYTES = 2000
 """Longer lines of a body's output are cut."""
 
-_SECRET = re.compile(
-    r"^(DIAPHANE_(?!STATE$)|AWS_|PG|DBOS|KUBERNETES_)|SECRET|TOKEN|PASSWORD|PASSWD|CREDENTIAL|_KEY$|_DSN$"
-)
+_SECRET = re.compile(r"^(DIAPHANE_|AWS_|PG|DBOS|KUBERNETES_)|SECRET|TOKEN|PASSWORD|PASSWD|CREDENTIAL|_KEY$|_DSN$")
+_SEARCHED = re.compile(r"^PXR_(?!WORK_THREAD_LIMIT$)|_SEARCH_PATH$")
+"""Variables that name folders in which USD and MaterialX would look for what a scene names."""
 
 log = structlog.get_logger(__name__)
 
@@ -50,10 +52,10 @@ class ChildOptions:
         make: `module:function` of tasks' bodies.
         inspect: `module:function` of checks of scenes.
         sandbox: `module:function` that shuts the process in; empty: it stays open.
-        store: Local folder of the artifacts.
-        read: Files and folders that may be read.
-        write: Folders that may be written to.
-        scratch: Folder for temporary files of children; each gets its own in it.
+        scratch: Folder of the children's rooms.
+        kernels: Folder of what numba compiled.
+        read: Files and folders that may be read beside the room.
+        write: Folders that may be written to beside the room.
         threads: Threads that a body may use.
         memory_bytes: Bound of a child's memory; None: none.
         file_bytes: Bound of a file that a child writes.
@@ -62,13 +64,30 @@ class ChildOptions:
     make: str
     inspect: str
     sandbox: str
-    store: Path
-    read: tuple[Path, ...]
-    write: tuple[Path, ...]
     scratch: Path
+    kernels: Path
+    read: tuple[Path, ...] = ()
+    write: tuple[Path, ...] = ()
     threads: int = 1
     memory_bytes: int | None = None
     file_bytes: int = 64 << 30
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """What a child sees for one request.
+
+    Attributes:
+        subject: Whose data it is: a process that has met one never meets another one; None: nobody's.
+        needs: Folders of artifacts by `stage/key`.
+        sources: Folders of sources by digest.
+        checkpoints: Folder that an interrupted training goes on from, and is kept in; None: it is no training.
+    """
+
+    subject: str | None = None
+    needs: Mapping[str, Path] = field(default_factory=dict)
+    sources: Mapping[str, Path] = field(default_factory=dict)
+    checkpoints: Path | None = None
 
 
 class Lost(Exception):
@@ -127,6 +146,8 @@ class Child:
 
     def __init__(self, options: ChildOptions, spawner: Spawner, name: str) -> None:
         self._options, self._spawner, self._name = options, spawner, name
+        self.room = Room(options.scratch / name)
+        self._assignment = Assignment()
         self._process: subprocess.Popen[bytes] | None = None
         self._channel: Channel | None = None
         self._lines: queue.SimpleQueue[str] = queue.SimpleQueue()
@@ -138,7 +159,14 @@ class Child:
         """Process id, while there is a process."""
         return None if self._process is None else self._process.pid
 
-    def call(self, title: str, request: Mapping[str, Any], seconds: float, hooks: Hooks) -> dict[str, Any]:
+    def call(
+        self,
+        title: str,
+        request: Mapping[str, Any],
+        seconds: float,
+        hooks: Hooks,
+        assignment: Assignment = Assignment(),
+    ) -> dict[str, Any]:
         """Does one request.
 
         Args:
@@ -146,9 +174,10 @@ class Child:
             request: As `services.engine.child` understands it.
             seconds: Longest time.
             hooks: Told what happens.
+            assignment: What it sees.
 
         Returns:
-            `facts` and `usage`.
+            `facts` and `usage`. An artifact that was made lies in the room until the next call.
 
         Raises:
             Problem: As the body raised it.
@@ -156,7 +185,8 @@ class Child:
             TaskError: The body raised something else, the process crashed, or it took too long.
             Lost: It was killed by `lose`.
         """
-        channel = self._ready(title)
+        channel = self._ready(title, assignment)
+        self.room.fill(assignment.needs, assignment.sources)
         try:
             channel.send(dict(request))
             answer = self._wait(title, channel, time.monotonic() + seconds, seconds, hooks)
@@ -187,10 +217,13 @@ class Child:
             self._kill()
         self._clear()
 
-    def _ready(self, title: str) -> Channel:
+    def _ready(self, title: str, assignment: Assignment) -> Channel:
         if self._process is not None and self._process.poll() is not None:
             self._clear()
+        if self._channel is not None and not self._fits(assignment):
+            self.stop()
         if self._channel is None:
+            self._assignment = assignment
             self._spawner.call(self._start)
             assert self._channel is not None
             try:
@@ -201,14 +234,19 @@ class Child:
                 raise self._ended(title)
             if answer.get("missing"):
                 log.warning("the sandbox is incomplete", missing=answer["missing"])
+        self._assignment = assignment
         return self._channel
+
+    def _fits(self, assignment: Assignment) -> bool:
+        """Whether the process may see that too."""
+        had = self._assignment
+        alone = had.subject is None or had.subject == assignment.subject
+        return alone and had.checkpoints == assignment.checkpoints and self.room.is_open()
 
     def _start(self) -> None:
         ours, theirs = socket.socketpair()
-        scratch = self._options.scratch / self._name
-        shutil.rmtree(scratch, ignore_errors=True)
-        scratch.mkdir(parents=True)
-        command = [sys.executable, "-m", "services.engine.child", str(theirs.fileno()), str(os.getpid())]
+        self.room.open()
+        command = [sys.executable, "-P", "-m", "services.engine.child", str(theirs.fileno()), str(os.getpid())]
         with theirs:
             process = subprocess.Popen(
                 command,
@@ -216,21 +254,23 @@ class Child:
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 pass_fds=(theirs.fileno(),),
-                env=_environment(scratch, self._options.threads),
+                env=self._environment(),
+                cwd=self.room.empty,
                 start_new_session=True,
             )
         channel = Channel(ours)
-        options = self._options
-        folders = [*options.write, scratch]
+        options, checkpoints = self._options, self._assignment.checkpoints
+        writable = [*self.room.writable, *options.write, *([] if checkpoints is None else [checkpoints])]
         with suppress(OSError):  # a child that ended at once is noticed by whoever waits for it
             channel.send(
                 {
                     "make": options.make,
                     "inspect": options.inspect,
                     "sandbox": options.sandbox,
-                    "store": str(options.store),
-                    "read": [str(path) for path in options.read],
-                    "write": [str(path) for path in folders],
+                    "room": str(self.room.folder),
+                    "checkpoints": str(checkpoints or self.room.tmp),
+                    "read": [str(path) for path in (*self.room.readable, *options.read)],
+                    "write": [str(path) for path in writable],
                     "memory_bytes": options.memory_bytes,
                     "file_bytes": options.file_bytes,
                 }
@@ -295,6 +335,16 @@ class Child:
                 if text and self._lines.qsize() < 10_000:
                     self._lines.put(text)
 
+    def _environment(self) -> dict[str, str]:
+        """The worker's environment without secrets, with its own folders, and with bounded thread pools."""
+        kept = {k: v for k, v in os.environ.items() if not _SECRET.search(k) and not _SEARCHED.search(k)}
+        count = str(self._options.threads)
+        pools = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "LP_NUM_THREADS")
+        kept |= {name: os.environ.get(name, count) for name in pools}
+        kept |= dict.fromkeys(("TMPDIR", "XDG_CACHE_HOME", "MPLCONFIGDIR"), str(self.room.tmp))
+        kept["NUMBA_CACHE_DIR"] = str(self._options.kernels)
+        return {**kept, "PYTHONUNBUFFERED": "1", "PYTHONPATH": os.pathsep.join([_ROOT, *_paths(kept)])}
+
     def _kill(self) -> None:
         if self._process is not None and self._process.poll() is None:
             with suppress(ProcessLookupError, PermissionError):
@@ -306,7 +356,7 @@ class Child:
                 self._process.wait(5.0)
         if self._channel is not None:
             self._channel.close()
-        shutil.rmtree(self._options.scratch / self._name, ignore_errors=True)
+        self.room.close()
         self._process = self._channel = None
 
 
@@ -336,19 +386,9 @@ class Pool:
             child.stop()
 
 
-def _environment(scratch: Path, threads: int) -> dict[str, str]:
-    """The worker's environment without secrets, with its own folders, and with bounded thread pools."""
-    kept = {name: value for name, value in os.environ.items() if not _SECRET.search(name)}
-    count = str(threads)
-    pools = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "LP_NUM_THREADS")
-    kept |= {name: os.environ.get(name, count) for name in pools}
-    kept |= {"TMPDIR": str(scratch), "XDG_CACHE_HOME": str(scratch), "MPLCONFIGDIR": str(scratch)}
-    kept.setdefault("NUMBA_CACHE_DIR", str(scratch.parent / "numba"))
-    return {**kept, "PYTHONUNBUFFERED": "1", "PYTHONPATH": os.pathsep.join([_ROOT, *_paths(kept)])}
-
-
 def _paths(environment: Mapping[str, str]) -> list[str]:
-    return [path for path in environment.get("PYTHONPATH", "").split(os.pathsep) if path]
+    """Where modules are found: absolute, as the child works in another folder."""
+    return [os.path.abspath(path) for path in environment.get("PYTHONPATH", "").split(os.pathsep) if path]  # noqa: PTH100
 
 
 _ROOT = str(Path(__file__).resolve().parents[2])

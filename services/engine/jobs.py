@@ -14,19 +14,18 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
-from schemas.job import JobKind, JobSpec, JobState, TaskState
+from schemas.job import FINAL_STATES, JobKind, JobSpec, JobState, TaskState
 from schemas.pixel_weights import DEFAULT_WEIGHTS
 from schemas.problem import ExitCode, Problem
 from schemas.service import EventRecord, ExecutorRecord, JobRecord, QueueRecord, TaskRecord
 from services.acceptance import Accepted
 from services.clock import iso
 from services.database import Database, tables
-from services.engine import events, progress, queues, states, system
+from services.database.clock import clock
+from services.engine import checks, events, progress, queues, states, system
 from services.engine.events import Event
-from services.engine.liveness import clock
 from services.settings import Settings
 from services.store import canonical_json
-from services.tasks import ROLES
 
 if TYPE_CHECKING:
     from dbos import DBOSClient
@@ -62,6 +61,7 @@ class Jobs:
         idempotency_key: str | None = None,
         request_id: str | None = None,
         accepted: Accepted | None = None,
+        most: int | None = None,
     ) -> tuple[JobRecord, bool]:
         """Queues a job.
 
@@ -71,12 +71,13 @@ class Jobs:
             idempotency_key: Names the request, so that it can be repeated until an answer arrives.
             request_id: Of the request.
             accepted: What was decided of it; None: nothing had to be.
+            most: Jobs of the key that may not have ended, this one included; None: any number.
 
         Returns:
             The job, and whether it is new: False if the same request came before.
 
         Raises:
-            Problem: The idempotency key came with another job before.
+            Problem: The idempotency key came with another job before, or the key has too many jobs under way.
         """
         digest, decided = _digest(spec), accepted or Accepted(spec)
         job_id = f"job_{uuid.uuid4().hex[:24]}"
@@ -85,6 +86,7 @@ class Jobs:
             earlier = _of_key(connection, submitted_by, idempotency_key)
             if earlier is not None:
                 return _same(earlier, digest), False
+            _require_place(connection, submitted_by, most)
             values: dict[str, Any] = {
                 "id": job_id,
                 "kind": spec.kind,
@@ -190,11 +192,15 @@ class Jobs:
         self._database.retry(body)
         return self.get(job_id)
 
-    def retry(self, job_id: str) -> JobRecord:
+    def retry(self, job_id: str, *, most: int | None = None) -> JobRecord:
         """Begins a failed or cancelled job anew; what it made before is found again.
 
+        Args:
+            job_id: The job.
+            most: As in `submit`, of the key that submitted it.
+
         Raises:
-            Problem: There is none of this id, or it has not failed.
+            Problem: There is none of this id, or it has not failed, or the key has too many jobs under way.
         """
 
         def body(connection: sa.Connection) -> None:
@@ -207,6 +213,7 @@ class Jobs:
                     "Retry a job that has failed or was cancelled.",
                     ExitCode.CONFLICT,
                 )
+            _require_place(connection, row.submitted_by, most)
             attempt = row.attempt + 1
             values: dict[str, Any] = {
                 "state": "queued",
@@ -286,18 +293,22 @@ class Jobs:
             return events.read(connection, job_id, after, limit)
 
     def queues(self) -> builtins.list[QueueRecord]:
-        """How much waits and runs, by role."""
+        """How much waits and runs, by role, and of checks."""
         table = system.workflows(self._database)
         query = (
             sa.select(table.c.queue_name, table.c.status, sa.func.count().label("number"))
-            .where(table.c.status.in_(system.LIVE), table.c.queue_name.in_(ROLES))
+            .where(table.c.status.in_(system.LIVE), table.c.queue_name.in_(queues.QUEUES))
             .group_by(table.c.queue_name, table.c.status)
         )
         counts: Counter[tuple[str, bool]] = Counter()
         with self._database.read() as connection:
             for row in connection.execute(query):
                 counts[row.queue_name, row.status == "PENDING"] += row.number
-        return [QueueRecord(role=role, queued=counts[role, False], running=counts[role, True]) for role in ROLES]
+            open_checks = sa.select(sa.func.count()).where(tables.scenes.c.state == "checking")
+            # Most of them wait in the queues of their keys.
+            waiting = int(connection.scalar(open_checks) or 0) - counts[queues.CHECKS, True]
+        counts[queues.CHECKS, False] = max(0, waiting)
+        return [QueueRecord(role=q, queued=counts[q, False], running=counts[q, True]) for q in queues.QUEUES]
 
     def executors(self) -> builtins.list[ExecutorRecord]:
         """Processes that run work, and those that did lately."""
@@ -314,16 +325,14 @@ class Jobs:
             for row in rows
         ]
 
-    def check_scene(self, scene_id: str) -> None:
-        """Queues the check of an uploaded scene; doing it again changes nothing while one waits or runs."""
+    def check_next(self, scene_id: str) -> None:
+        """Has workers check what the key that sent a scene has waiting; see `services.engine.checks`."""
 
         def body(connection: sa.Connection) -> None:
-            prefix = f"{scene_id}/"
-            found = system.statuses(connection, self._database, prefix)
-            if not any(status in system.LIVE for _, status in found):
-                workflow_id = f"{prefix}{len(found)}"
-                first = queues.CLASSES["high"]  # somebody waits for it
-                system.enqueue(self.client, connection, "check", workflow_id, "render", scene_id, priority=first)
+            sender = sa.select(tables.scenes.c.created_by).where(tables.scenes.c.id == scene_id)
+            key = connection.scalar(sender)
+            if key is not None:
+                checks.queue_next(connection, self._database, self.client, key, self._settings.checks_per_key)
 
         self._database.retry(body)
 
@@ -391,6 +400,24 @@ def _same(earlier: sa.Row[Any], digest: str) -> str:
             ExitCode.CONFLICT,
         )
     return str(earlier.id)
+
+
+def _require_place(connection: sa.Connection, submitted_by: str, most: int | None) -> None:
+    """Refuses one more job of a key; requests of the key wait for each other, so that all are counted.
+
+    Raises:
+        Problem: It has `most` that have not ended.
+    """
+    if most is None:
+        return
+    connection.execute(sa.select(tables.keys.c.id).where(tables.keys.c.id == submitted_by).with_for_update())
+    mine = sa.and_(tables.jobs.c.submitted_by == submitted_by, tables.jobs.c.state.not_in(FINAL_STATES))
+    if int(connection.scalar(sa.select(sa.func.count()).where(mine)) or 0) >= most:
+        raise Problem(
+            f"The key has {most} jobs that have not ended, as many as it may.",
+            "Wait until some have ended, or cancel them.",
+            ExitCode.LIMIT,
+        )
 
 
 def _unknown(job_id: str) -> Problem:

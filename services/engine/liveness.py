@@ -28,10 +28,10 @@ import structlog
 from sqlalchemy.exc import DBAPIError
 
 from services.database import Database, tables
+from services.database.clock import clock
 from services.engine import system
 from services.engine.claims import Claims
 from services.settings import Settings
-from services.tasks import Role
 
 FORGOTTEN_SECONDS = 24 * 3600.0
 ORPHAN_LOOKS = 3
@@ -58,13 +58,6 @@ def process_start(pid: int) -> str | None:
     return None if fields[0] in ("Z", "X") else fields[19]
 
 
-def clock(database: Database) -> sa.ColumnElement[float]:
-    """The database's clock, seconds since 1970."""
-    if database.is_postgresql:
-        return sa.literal_column("extract(epoch from clock_timestamp())::double precision")
-    return sa.literal_column("((julianday('now') - 2440587.5) * 86400.0)")
-
-
 class Liveness:
     """Tells that this process lives, and sees to those that do not.
 
@@ -72,7 +65,7 @@ class Liveness:
         settings: Of the service.
         database: The database.
         claims: What runs here.
-        slots: Roles of this process and what it does of each at once.
+        slots: Queues of this process and what it does of each at once.
         adrift: Sees to jobs and checks that nobody does any more; called by those who conduct jobs.
     """
 
@@ -81,7 +74,7 @@ class Liveness:
         settings: Settings,
         database: Database,
         claims: Claims,
-        slots: Mapping[Role, int],
+        slots: Mapping[str, int],
         adrift: Callable[[], None] = lambda: None,
     ) -> None:
         self.executor = f"{socket.gethostname()}-{os.getpid()}-{uuid.uuid4().hex[:8]}"

@@ -1,14 +1,16 @@
-"""A queue for each role, and who is served first.
+"""A queue for each role and one for checks of uploads, and who is served first.
 
 Order within a queue is by class first (high, normal, low) and by start-time fair queueing within a class (Goyal, Vin
 and Cheng, 1996, with equal weights and tasks of equal cost): a job's first task gets the virtual time at which the
 queue is now, or that after the job's last one, and every further task one more. So jobs of one class take turns,
 however many tasks each has queued and whoever came first.
+
+Checks are queued one after the other for each key (`services.engine.checks`), so keys take turns.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import sqlalchemy as sa
 
@@ -21,6 +23,10 @@ from services.tasks import ROLES, Role
 if TYPE_CHECKING:
     from dbos import DBOSClient
 
+CHECKS: Final = "check"
+"""Queue of checks: of the workers for the role `render`, who have USD."""
+QUEUES: Final = (*ROLES, CHECKS)
+
 JOB_SLOTS = 32
 """Jobs that one process conducts at once; each is a thread that waits."""
 
@@ -29,15 +35,16 @@ CLASSES: dict[Priority, int] = {"high": 1, "normal": 1 + CLASS_WIDTH, "low": 1 +
 """First priority number of each class; the smaller, the earlier."""
 
 
-def slots(settings: Settings, roles: tuple[Role, ...]) -> dict[Role, int]:
-    """How many workflows of each role a process runs at once."""
+def slots(settings: Settings, roles: tuple[Role, ...]) -> dict[str, int]:
+    """How many workflows of each queue a process with these roles runs at once."""
     children: dict[Role, int] = {
         "jobs": JOB_SLOTS,
         "render": settings.slots_render,
         "label": settings.slots_label,
         "train": settings.slots_train,
     }
-    return {role: children[role] for role in ROLES if role in roles}
+    found: dict[str, int] = {role: children[role] for role in ROLES if role in roles}
+    return {**found, CHECKS: settings.slots_check} if "render" in roles else found
 
 
 def register(client: DBOSClient, settings: Settings) -> None:
@@ -45,8 +52,8 @@ def register(client: DBOSClient, settings: Settings) -> None:
 
     A process claims nothing before it has said how much it can do (`system.limit_slots`).
     """
-    for role in ROLES:
-        client.register_queue(role, worker_concurrency=0, polling_interval_sec=settings.poll)
+    for queue in QUEUES:
+        client.register_queue(queue, worker_concurrency=0, polling_interval_sec=settings.poll)
 
 
 def job_priority(priority: Priority) -> int:

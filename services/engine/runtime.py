@@ -24,12 +24,14 @@ from services.engine.claims import Claims
 from services.engine.housekeeping import Housekeeping
 from services.engine.jobs import Jobs
 from services.engine.liveness import Liveness
+from services.engine.rooms import KERNELS, Scratch
 from services.engine.runner import DurableRunner
 from services.engine.states import Abandoned, Cancelled, Claim
 from services.engine.tasks import Place, Tasks
 from services.engine.work import Worker
 from services.problems import document_of, summary_of
 from services.settings import Settings
+from services.sources import sweep_sources
 from services.tasks import ROLES, Role
 
 if TYPE_CHECKING:
@@ -127,7 +129,7 @@ class Runtime:
         self._stack.callback(self._jobs.close)
         self._parts = self._parts or open_parts(self.settings, self._database, self._jobs)
         self._tasks = Tasks(self._database, self._jobs.client, self._bodies.retry_seconds)
-        children: dict[Role, int] = {role: count for role, count in self._slots.items() if role != "jobs"}
+        children: dict[Role, int] = {role: self._slots[role] for role in self.roles if role != "jobs"}
         options = self._child_options(sum(children.values()))
         self._worker = Worker(self.settings, self._parts.storage, self._tasks, self._claims, options, children)
         self._liveness = Liveness(self.settings, self._database, self._claims, self._slots, self._see_to_adrift)
@@ -203,6 +205,7 @@ class Runtime:
         claim = Claim(workflow_id, self.executor)
         with self._claims.hold(workflow_id), structlog.contextvars.bound_contextvars(scene_id=scene_id):
             self._worker.check(claim, scene_id, self._parts.scenes)
+            self._jobs.check_next(scene_id)
 
     def _see_to_adrift(self) -> None:
         for job_id in states.end_adrift(self._database):
@@ -239,7 +242,7 @@ class Runtime:
         from dbos import DBOS, DBOSConfig, DBOSPortableJSONSerializer
 
         flow.use(self)
-        self._claimable.update({str(role): count for role, count in self._slots.items()})
+        self._claimable.update(self._slots)
         config = DBOSConfig(
             name=system.APPLICATION,
             system_database_url=system.engine_url(self._database.url),
@@ -257,21 +260,18 @@ class Runtime:
         system.limit_slots(self._claimable)
 
     def _child_options(self, children: int) -> ChildOptions:
-        assert self._parts is not None
-        store = self._parts.storage.store.root
-        scratch = self.settings.state.resolve() / "work"
-        cache = self.settings.cache_folder
-        writable = [store, store.parent / "checkpoints", scratch / "numba"]
-        for folder in (*writable, cache):
-            folder.mkdir(parents=True, exist_ok=True)
+        self._scratch = Scratch(self.settings.state.resolve() / "work")
+        self._stack.callback(self._scratch.close)
+        sweep_sources(self.settings.cache_folder, time.time())
+        kernels = self._scratch.folder.parent / KERNELS
+        kernels.mkdir(exist_ok=True)
         return ChildOptions(
             make=self._bodies.make,
             inspect=self._bodies.inspect,
             sandbox=self._bodies.sandbox,
-            store=store,
-            read=(store, cache),
-            write=tuple(writable),
-            scratch=scratch,
+            scratch=self._scratch.folder,
+            kernels=kernels,
+            write=(kernels,),
             memory_bytes=self.settings.task_bytes or None,
             threads=max(1, len(os.sched_getaffinity(0)) // max(1, children)),
         )

@@ -133,6 +133,13 @@ def live(connection: sa.Connection, database: Database, prefix: str) -> int:
     return int(connection.scalar(counted) or 0)
 
 
+def live_ids(connection: sa.Connection, database: Database, prefix: str) -> list[str]:
+    """Ids of the workflows under a prefix that wait or run."""
+    table = workflows(database)
+    found = sa.select(table.c.workflow_uuid).where(under(table, prefix, database), table.c.status.in_(LIVE))
+    return list(connection.scalars(found))
+
+
 def statuses(connection: sa.Connection, database: Database, prefix: str) -> list[tuple[str, str]]:
     """Id and status of all workflows under a prefix."""
     table = workflows(database)

@@ -5,6 +5,7 @@ The parent talks to database and store; the body, in a child process, reads what
 
 from __future__ import annotations
 
+import shutil
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -17,7 +18,7 @@ from sqlalchemy.exc import DBAPIError
 from renderer.gate import ended
 from schemas.problem import Problem
 from services.engine import problems
-from services.engine.children import Child, ChildOptions, Hooks, Lost, Pool, Spawner
+from services.engine.children import Assignment, Child, ChildOptions, Hooks, Lost, Pool, Spawner
 from services.engine.claims import Claims
 from services.engine.events import Event
 from services.engine.states import Abandoned, Claim
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
 
 REPORT_SECONDS = 1.0
 LINES_PER_TASK = 2000
-CHECK_SECONDS = 300.0
-CHECK_MEMORY_BYTES = 8 << 30
 CHECK_TRIES = 2
 
 log = structlog.get_logger(__name__)
@@ -165,14 +164,15 @@ class Worker:
             return
         source = source_of_scene(record)
         folder = materialise(source, self._storage.blobs, self._settings.cache_folder)
-        options = replace(self._options, read=(folder,), write=(), memory_bytes=CHECK_MEMORY_BYTES)
-        seconds = min(self._settings.task_seconds, CHECK_SECONDS)
+        request = {"source": source.digest, "root": source.root}
+        assignment = Assignment(subject=source.digest, sources={source.digest: folder})
+        options = replace(self._options, write=(), memory_bytes=self._settings.check_bytes)
+        seconds = self._settings.check_seconds
         for left in reversed(range(CHECK_TRIES)):
             child = Child(options, self._spawner, f"check-{scene_id}")
             self._claims.on_loss(claim.workflow_id, child.lose)
             try:
-                request = {"folder": str(folder), "root": source.root}
-                answer = child.call(f"the check of {record.name}", request, seconds, Hooks())
+                answer = child.call(f"the check of {record.name}", request, seconds, Hooks(), assignment)
             except Lost:
                 raise Abandoned(claim.workflow_id) from None
             except Problem as problem:
@@ -192,20 +192,35 @@ class Worker:
 
     def _make(self, claim: Claim, task: Task, title: str, reporter: _Reporter) -> str:
         """Has the artifact made and stored; what it took, in words."""
-        store, blobs = self._storage.store, self._storage.blobs
-        for need in task.needs:
-            store.fetch(need)
-        sources = [source for source in (task.scene, task.bundle) if source is not None and source.files]
-        folders = {s.digest: str(materialise(s, blobs, self._settings.cache_folder)) for s in sources}
+        store = self._storage.store
+        assignment = self._assignment(task)
         seconds = self._settings.train_seconds if task.stage == "train" else self._settings.task_seconds
-        request = {"task": task.model_dump(mode="json"), "folders": folders}
+        request = {"task": task.model_dump(mode="json")}
         hooks = Hooks(reporter.progress, reporter.line, reporter.tick)
         with self._pools[task.role].child() as child:
             self._claims.on_loss(claim.workflow_id, child.lose)
             try:
-                answer = child.call(title, request, seconds, hooks)
+                answer = child.call(title, request, seconds, hooks, assignment)
+                store.adopt(child.room.artifact(task.address), task.artifact)
             finally:
                 self._claims.on_loss(claim.workflow_id, None)
+        if assignment.checkpoints is not None:
+            shutil.rmtree(assignment.checkpoints, ignore_errors=True)
         store.push(task.address)
         usage = answer["usage"]
         return f"{usage['cpu_seconds']:.1f} s CPU, {usage['peak_bytes'] / 2**20:.0f} MiB"
+
+    def _assignment(self, task: Task) -> Assignment:
+        """What the process of a task sees: what the task reads, and nothing else."""
+        store, checkpoints = self._storage.store, None
+        sources = [source for source in (task.scene, task.bundle) if source is not None and source.files]
+        subject = None if task.scene is None else task.scene.digest
+        if task.stage == "train":
+            subject, checkpoints = task.artifact, store.checkpoints / task.address.key
+            checkpoints.mkdir(parents=True, exist_ok=True)
+        return Assignment(
+            subject=subject,
+            needs={need: store.fetch(need) for need in task.needs},
+            sources={s.digest: materialise(s, self._storage.blobs, self._settings.cache_folder) for s in sources},
+            checkpoints=checkpoints,
+        )

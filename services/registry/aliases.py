@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import getpass
 import hashlib
-import time
 from collections.abc import Sequence
+from typing import Any
 
 import sqlalchemy as sa
 
@@ -14,6 +14,7 @@ from schemas.service import MoveRecord
 from services.clock import iso
 from services.database import Database
 from services.database.tables import aliases, moves
+from services.registry.pointers import next_move
 
 
 def local_user() -> str:
@@ -63,8 +64,9 @@ def move(database: Database, name: str, change: MoveRecord, *, only_from_before:
             connection.execute(aliases.insert().values(name=name, alias=change.alias, version=change.after))
         else:
             connection.execute(aliases.update().where(where).values(version=change.after))
-        values = {"before": now, "after": change.after, "who": change.who, "why": change.why}
-        connection.execute(moves.insert().values(name=name, alias=change.alias, at=time.time(), **values))
+        values: dict[str, Any] = {"before": now, "after": change.after, "who": change.who, "why": change.why}
+        values["at"] = next_move(connection, name, change.alias)
+        connection.execute(moves.insert().values(name=name, alias=change.alias, **values))
 
     database.retry(body)
 

@@ -3,7 +3,8 @@
 Rules:
 - a bundle is published once: the same files again give the version they already have, whoever publishes them, when and
   however often; the files come first, then one row;
-- versions are 1.0.0, 1.1.0, 1.2.0, ... in order of publication, signed; a row never changes and is never removed;
+- versions are 1.0.0, 1.1.0, 1.2.0, ... in order of publication, signed; a row never changes, but for its signature
+  when the key does, and is never removed;
 - publishing moves no alias; `promote` and `rollback` do, and keep who, when and why; `consider` promotes what is
   better on the same held-out views and whose exported forms agree, and names the rest `candidate`.
 """
@@ -11,7 +12,6 @@ Rules:
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -20,15 +20,16 @@ import sqlalchemy as sa
 
 from schemas.bundle import MANIFEST, Manifest, load_manifest
 from schemas.problem import ExitCode, Problem
-from schemas.service import FileRef, ModelRecord, MoveRecord, VersionRecord
-from services.clock import iso
+from schemas.service import ModelRecord, MoveRecord, PointerRecord, VersionRecord
 from services.database import Database
 from services.database.tables import aliases, versions
+from services.registry import handovers, pointers
 from services.registry.aliases import history, local_user, lock_name, move, previous
 from services.registry.checkout import check_out
 from services.registry.names import bundle_files, check_name, digest_of
 from services.registry.records import CANDIDATE, CHAMPION, Aliases, Move, Publication
-from services.registry.signing import Signer, statement
+from services.registry.rows import files_of, publication_of, signed_columns
+from services.registry.signing import Signer
 from services.settings import Settings
 from services.storage import Blobs
 
@@ -61,7 +62,7 @@ class Registry:
         """All versions of a name, oldest first; none if the name is unknown."""
         query = sa.select(versions).where(versions.c.name == check_name(name)).order_by(versions.c.ordinal)
         with self._database.read() as connection:
-            return [_publication(row) for row in connection.execute(query)]
+            return [publication_of(row) for row in connection.execute(query)]
 
     def aliases(self, name: str) -> Aliases:
         """Aliases of a name and their history."""
@@ -84,17 +85,20 @@ class Registry:
         name, _, selector = reference.partition("@")
         selector = selector or CHAMPION
         found = self._aliased(check_name(name), selector) or self._version(name, selector)
-        if found is not None:
-            return found
-        if not self.versions(name):
-            raise Problem(
-                f"There is no bundle '{name}' in the registry.", "See `diaphane models list`.", ExitCode.NOT_FOUND
-            )
-        raise Problem(
-            f"'{name}' has no version or alias '{selector[:_ALIAS_LENGTH]}'.",
-            f"See `diaphane models show {name}` for what it has.",
-            ExitCode.NOT_FOUND,
-        )
+        if found is None:
+            raise self._unknown(name, selector)
+        return found
+
+    def pointer(self, name: str, selector: str) -> PointerRecord:
+        """What an alias or a version means now, signed until it expires.
+
+        Raises:
+            Problem: There is no such name, version or alias, or this process has another signing key than the registry.
+        """
+        found = pointers.pointer(self._database, self._signer.key, check_name(name), selector)
+        if found is None:
+            raise self._unknown(name, selector)
+        return found
 
     def folder(self, publication: Publication) -> Path:
         """A local folder with a version's files, verified, and written again if they were damaged.
@@ -103,7 +107,7 @@ class Registry:
             MissingBlob: A file is no longer in the store.
             OSError: The folder cannot be written.
         """
-        files = _files(self._row(publication))
+        files = files_of(self._row(publication))
         return check_out(self._checkouts / publication.name / publication.version, publication, files, self._blobs)
 
     def publish(
@@ -142,12 +146,15 @@ class Registry:
             lock_name(connection, name)
             row = connection.execute(known).one_or_none()
             if row is None:
-                values = self._signed(connection, name, digest, files)
+                handovers.share_key(connection)
+                key = self._signer.key
+                handovers.require_key(connection, key)
+                values = signed_columns(connection, key, name, digest, files)
                 values |= {"score": score, "evaluation": dict(evaluation)}
                 values |= {"artifacts": list(artifacts), "job_id": job_id}
                 connection.execute(versions.insert().values(values))
                 row = connection.execute(known).one()
-            return _publication(row)
+            return publication_of(row)
 
         return self._database.retry(body)
 
@@ -293,49 +300,36 @@ class Registry:
         return history(self._database, check_name(name))
 
     def public_keys(self) -> list[str]:
-        """Public keys that versions are or were signed with, base64; the present one first.
+        """The public key that versions and aliases are signed with, base64, then those that came before it.
 
         Raises:
             Problem: The key file is damaged.
             OSError: The key file can be neither read nor made.
         """
         with self._database.read() as connection:
-            used = set(connection.scalars(sa.select(versions.c.public_key).distinct()))
-        present = self._signer.public_key
-        return [present, *sorted(used - {present})]
+            present = handovers.public_key(connection) or self._signer.key.public_key
+            return [present, *handovers.retired_keys(connection)]
 
-    def _signed(
-        self, connection: sa.Connection, name: str, digest: str, files: Mapping[str, FileRef]
-    ) -> dict[str, Any]:
-        """Columns of a new version that its signature covers."""
-        last = connection.scalar(sa.select(sa.func.max(versions.c.ordinal)).where(versions.c.name == name))
-        ordinal = 0 if last is None else last + 1
-        version, created = f"1.{ordinal}.0", int(time.time())
-        text = statement(name, version, digest, iso(created), files)
-        return {
-            "name": name,
-            "version": version,
-            "ordinal": ordinal,
-            "digest": digest,
-            "files": {file: reference.model_dump() for file, reference in files.items()},
-            "statement": text,
-            "signature": self._signer.sign(text),
-            "public_key": self._signer.public_key,
-            "created": float(created),
-        }
+    def _unknown(self, name: str, selector: str) -> Problem:
+        if not self.versions(name):
+            title, remedy = f"There is no bundle '{name}' in the registry.", "See `diaphane models list`."
+        else:
+            title = f"'{name}' has no version or alias '{selector[:_ALIAS_LENGTH]}'."
+            remedy = f"See `diaphane models show {name}` for what it has."
+        return Problem(title, remedy, ExitCode.NOT_FOUND)
 
     def _version(self, name: str, version: str) -> Publication | None:
         query = sa.select(versions).where((versions.c.name == name) & (versions.c.version == version))
         with self._database.read() as connection:
             row = connection.execute(query).one_or_none()
-        return None if row is None else _publication(row)
+        return None if row is None else publication_of(row)
 
     def _aliased(self, name: str, alias: str) -> Publication | None:
         meant = (versions.c.name == aliases.c.name) & (versions.c.version == aliases.c.version)
         asked = (aliases.c.name == name) & (aliases.c.alias == alias)
         with self._database.read() as connection:
             row = connection.execute(sa.select(versions).join(aliases, meant).where(asked)).one_or_none()
-        return None if row is None else _publication(row)
+        return None if row is None else publication_of(row)
 
     def _row(self, publication: Publication) -> Any:
         mine = (versions.c.name == publication.name) & (versions.c.version == publication.version)
@@ -348,7 +342,7 @@ class Registry:
             **publication.model_dump(),
             parity=manifest.parity.model_dump(mode="json"),
             provenance=manifest.provenance.model_dump(mode="json"),
-            files=_files(row),
+            files=files_of(row),
             statement=row.statement,
             signature=row.signature,
             public_key=row.public_key,
@@ -358,7 +352,7 @@ class Registry:
 
     def _manifest(self, row: Any) -> Manifest:
         if row.digest not in self._manifests:
-            content = b"".join(self._blobs.read(_files(row)[MANIFEST].sha256))
+            content = b"".join(self._blobs.read(files_of(row)[MANIFEST].sha256))
             self._manifests[row.digest] = Manifest.model_validate_json(content)
         return self._manifests[row.digest]
 
@@ -374,21 +368,6 @@ def open_registry(database: Database, blobs: Blobs, settings: Settings) -> Regis
         Problem: The signing key of the settings is not one.
     """
     return Registry(database, blobs, Signer.open(settings), settings.state / "registry")
-
-
-def _publication(row: Any) -> Publication:
-    return Publication(
-        name=row.name,
-        version=row.version,
-        digest=row.digest,
-        score=row.score,
-        evaluation=row.evaluation,
-        created=iso(row.created),
-    )
-
-
-def _files(row: Any) -> dict[str, FileRef]:
-    return {name: FileRef.model_validate(reference) for name, reference in row.files.items()}
 
 
 def _change(alias: str, before: str | None, after: str, why: str, who: str | None) -> MoveRecord:

@@ -7,6 +7,7 @@ import uuid
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -14,6 +15,7 @@ from schemas.measurement import Measurement, ReportData
 from services import summary
 from services.report import charts
 from services.report.pictures import PictureSet, plates
+from services.visible import visible
 
 TEMPLATES = Path(__file__).resolve().parent.parent / "templates"
 
@@ -95,12 +97,18 @@ def environment() -> Environment:
     made = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
+        finalize=_shown,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     made.filters.update(number=summary.number, technique=summary.title, mib=_mib, count=_count)
     return made
+
+
+def _shown(value: Any) -> Any:
+    """What stands in a page: `Markup` stays what it is."""
+    return type(value)(visible(value)) if isinstance(value, str) else value
 
 
 def _mib(size: int | None) -> str:

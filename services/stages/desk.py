@@ -72,7 +72,7 @@ class Desk:
 
     def checkpoint(self, task: Task) -> Path:
         """File that an interrupted training goes on from: the artifact's key names exactly this training."""
-        folder = self.store.root.parent / "checkpoints"
+        folder = self.store.checkpoints
         folder.mkdir(parents=True, exist_ok=True)
         return folder / f"{task.address.key}.safetensors"
 
@@ -84,9 +84,16 @@ class Desk:
         wanted = _present(task.scene, task).digest, alpha
         if self._scene is None or self._loaded != wanted:
             self._gpu, self._scene = None, None
-            self._scene = load_scene(self.scene_path(task), LoadOptions(alpha=alpha))
+            path = self.scene_path(task)
+            self._scene = load_scene(path, LoadOptions(alpha=alpha, home=self._home(task, path)))
             self._loaded = wanted
         return self._scene
+
+    def _home(self, task: Task, path: Path) -> Path | None:
+        """Folder that a stranger's scene, opened from a path, is read from alone."""
+        source = _present(task.scene, task)
+        folder = self._folder_of(source)
+        return None if source.trusted else folder if path.is_relative_to(folder) else path.parent
 
     def gpu(self, task: Task) -> GpuScene:
         """The scene on the GPU: all views of a scene reuse one upload."""

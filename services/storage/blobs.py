@@ -7,13 +7,16 @@
 
 Rules:
 - a blob is complete or absent: written under a temporary name while it is hashed, synced, then renamed;
-- a blob is hashed again when its size or time of change is not what it was when it last matched;
+- a process hashes a blob before it hands it out the first time, also one that it stored itself, and again when it is
+  another file, or its size or one of its times of change is not what it was when it last matched;
 - a damaged blob counts as missing, and storing the same bytes again heals it;
+- a store whose folder is gone is away, which says nothing of the blobs that are in it;
 - names come from clients, so that only 64 hex digits, and ids of uploads, are ever made into paths.
 """
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import io
 import logging
@@ -34,6 +37,10 @@ from services.store import TOUCH_SECONDS, file_sha256, sync
 CHUNK = 1 << 20
 """Bytes read and written at a time."""
 
+LEAST_FREE_BYTES = 64 << 20
+"""Below this a store is full: two parts of an upload."""
+
+_PROBE_BYTES = 4096
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _UPLOAD = re.compile(r"[a-z]{3}_[0-9a-f]{12,64}")
 
@@ -67,7 +74,7 @@ class Blobs:
         self.root = root
         self._temporary = root / "tmp"
         self._temporary.mkdir(parents=True, exist_ok=True)
-        self._verified: dict[str, tuple[int, int]] = {}
+        self._verified: dict[str, _State] = {}
 
     def put_file(self, path: Path) -> FileRef:
         """Stores a file's content; nothing to write if it is there already.
@@ -94,7 +101,10 @@ class Blobs:
         """Bytes of the blob, without reading it; None if it is absent. Counts as a use of it."""
         try:
             size = self._path(sha256).stat().st_size
-        except (FileNotFoundError, ValueError):
+        except FileNotFoundError:
+            self._require_there()
+            return None
+        except ValueError:
             return None
         self._touch(sha256)
         return size
@@ -110,6 +120,7 @@ class Blobs:
         except ValueError:
             raise MissingBlob(sha256) from None
         if not self._intact(sha256):
+            self._require_there()
             raise MissingBlob(sha256)
         self._touch(sha256)
         return path
@@ -125,6 +136,22 @@ class Blobs:
         except FileNotFoundError:
             raise MissingBlob(sha256) from None
         return _range(stream, start, end)
+
+    def probe(self) -> None:
+        """Makes sure that the store is there and takes what is written.
+
+        Raises:
+            Problem: It is away.
+            OSError: It cannot be written, or has less than `LEAST_FREE_BYTES` left.
+        """
+        self._require_there()
+        if shutil.disk_usage(self.root).free < LEAST_FREE_BYTES:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        path = self._temporary / f"probe-{uuid.uuid4().hex}"
+        try:
+            path.write_bytes(bytes(_PROBE_BYTES))
+        finally:
+            path.unlink(missing_ok=True)
 
     def remove(self, sha256: str) -> None:
         """Removes a blob; does nothing if it is absent. Files opened before can still be read."""
@@ -158,6 +185,7 @@ class Blobs:
         Raises:
             OSError: The store cannot be written.
         """
+        self._require_there()
         folder = self._upload(upload_id)
         folder.mkdir(parents=True, exist_ok=True)
         temporary = self._temporary / f"part-{uuid.uuid4().hex}"
@@ -232,6 +260,7 @@ class Blobs:
 
     def _ingest(self, chunks: Iterable[bytes], expected: str | None = None) -> FileRef:
         """Stores a stream, hashing it on the way; with `expected`, only if it has that hash."""
+        self._require_there()
         temporary = self._temporary / f"blob-{uuid.uuid4().hex}"
         digest, size = hashlib.sha256(), 0
         try:
@@ -258,7 +287,6 @@ class Blobs:
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary.replace(path)
         sync(path.parent)
-        self._verified[sha256] = _state(path)
 
     def _intact(self, sha256: str) -> bool:
         """Whether the blob is there and matches its name; a damaged one is moved aside."""
@@ -295,13 +323,27 @@ class Blobs:
             raise ValueError("That is not the id of an upload.")
         return self.root / "uploads" / upload_id
 
+    def _require_there(self) -> None:
+        """Refuses to say that a blob is absent where the whole store is.
+
+        Raises:
+            Problem: The store is away.
+        """
+        if not self._temporary.is_dir():
+            raise Problem(
+                "The store cannot be reached.", "Mount its folder again, then repeat this.", ExitCode.TRY_AGAIN
+            )
+
     def _touch(self, sha256: str) -> None:
         """Writes down a use, as the time of access: the time of change belongs to the verification."""
         path = self._path(sha256)
         with suppress(OSError):
             stat = path.stat()
             if time.time() - max(stat.st_atime, stat.st_mtime) > TOUCH_SECONDS:
+                before = _state_of(stat)
                 os.utime(path, ns=(time.time_ns(), stat.st_mtime_ns))
+                if self._verified.get(sha256) == before:
+                    self._verified[sha256] = _state(path)  # the times of the inode are others now
 
 
 class _OtherContentError(Exception):
@@ -312,9 +354,16 @@ class _OtherContentError(Exception):
         self.found = found
 
 
-def _state(path: Path) -> tuple[int, int]:
-    stat = path.stat()
-    return stat.st_size, stat.st_mtime_ns
+_State = tuple[int, int, int, int]
+
+
+def _state(path: Path) -> _State:
+    return _state_of(path.stat())
+
+
+def _state_of(stat: os.stat_result) -> _State:
+    """What changes when a file does; the time of change of its inode cannot be set back."""
+    return stat.st_ino, stat.st_size, stat.st_mtime_ns, stat.st_ctime_ns
 
 
 def _chunks(stream: BinaryIO) -> Iterator[bytes]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
 import threading
@@ -27,6 +28,8 @@ USED_SECONDS = 12 * 3600.0
 
 _RETRY_SECONDS = 20.0
 _USED = "used"
+_FULL = ("XMinioStorageFull", "QuotaExceeded", "InsufficientStorage", "507 Insufficient Storage")
+"""What servers call it."""
 
 log = logging.getLogger(__name__)
 
@@ -199,6 +202,8 @@ def _reported() -> Iterator[None]:
         ) from error
     except BaseError as error:
         log.warning("The object store failed: %s", _first_line(error))
+        if any(word in str(error) for word in _FULL):
+            raise OSError(errno.ENOSPC, "the object store is full") from error
         raise Problem(
             "The object store cannot be reached, or could not do what was asked.",
             "Check that it runs and AWS_ENDPOINT_URL is right, then try again.",

@@ -303,6 +303,16 @@ class TieredBlobs(Blobs):
         self._remote.touch(self._key(sha256), entry.modified)
         return entry.bytes
 
+    def probe(self) -> None:
+        """Makes sure that the cache takes what is written, and that the object store answers.
+
+        Raises:
+            Problem: One of them is away.
+            OSError: The cache cannot be written, or is full.
+        """
+        super().probe()
+        self._remote.head(self._key("0" * 64))
+
     def path(self, sha256: str) -> Path:
         """A local file with the blob's verified content, downloaded if need be; to be read only.
 

@@ -16,7 +16,7 @@ from services.rendering import bundle_folder
 FETCHED = "bundles"
 """Folder of fetched bundles, in that of the state."""
 _EVERY = 5.0
-"""Seconds between two questions for the alias; one about the same version costs an answer without a body."""
+"""Seconds between two questions for the alias; one about the same version costs a small answer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +29,7 @@ class Service:
         key: API key; None: none.
         state: Folder of the state, in which fetched bundles are kept.
         follow: Whether later versions of the alias are fetched, too.
+        public_key: The server's signing key, base64; None: the one that was seen first.
     """
 
     reference: str
@@ -36,6 +37,7 @@ class Service:
     key: str | None
     state: Path
     follow: bool
+    public_key: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +89,9 @@ def remote_source(service: Service) -> Iterator[Source]:
     client = _client()
     name, _, alias = service.reference.partition("@")
     asked: dict[str, Any] = {"url": service.url, "key": service.key, "folder": service.state / FETCHED}
+    asked["public_key"] = service.public_key
     stop, later = threading.Event(), queue.SimpleQueue[Path]()
-    bundles = client.watch(name, alias or "champion", every=_EVERY, stop=stop, allow_rollback=service.follow, **asked)
+    bundles = client.watch(name, alias or "champion", every=_EVERY, stop=stop, **asked)
     try:
         first = next(bundles)
     except client.PullError as error:

@@ -67,17 +67,27 @@ def clips(lines: str) -> str:
     return usda(f'def "Attack" (\n{inside}\n) {{\ndouble x\n}}', start)
 
 
+ENDLESS = "double templateStartTime = 0\ndouble templateEndTime = 1e9\ndouble templateStride = 1e-9"
 ACTIVE = "double2[] active = [(0, 0)]\ndouble2[] times = [(0, 0), (4, 4)]"
 TEMPLATE = "double templateStartTime = 0\ndouble templateEndTime = 2\ndouble templateStride = 1"
 OUT = "../canary/canary.usda"
 
 
+def chunk(kind: bytes, data: bytes) -> bytes:
+    """A chunk of a PNG."""
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+def palette(colours: bytes | None, kind: int = 3, depth: int = 8) -> bytes:
+    """A PNG with the indices of a palette, with or without the palette."""
+    header = chunk(b"IHDR", struct.pack(">IIBBBBB", 2, 2, depth, kind, 0, 0, 0))
+    given = b"" if colours is None else chunk(b"PLTE", colours)
+    pixels = chunk(b"IDAT", zlib.compress(b"\0\0\1" * 2, 9))
+    return b"\x89PNG\r\n\x1a\n" + header + given + pixels + chunk(b"IEND", b"")
+
+
 def png(width: int = 2, height: int = 2, size: tuple[int, int] | None = None) -> bytes:
     """A grey PNG; its header may claim another size."""
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
     rows = zlib.compress((b"\0" + b"\x80" * width) * height, 9)
     header = struct.pack(">IIBBBBB", *(size or (width, height)), 8, 0, 0, 0, 0)
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", rows) + chunk(b"IEND", b"")
@@ -137,9 +147,11 @@ def chain(length: int) -> dict[str, bytes]:
     return {**layers, f"l{length}.usda": usda().encode()}
 
 
-def instancers(levels: int, copies: int) -> str:
-    """Point instancers in each other."""
-    inner = 'def Scope "P" {\n' + mesh() + "}\n"
+def instancers(levels: int, copies: int, faces: int = 1) -> str:
+    """Point instancers in each other, of a mesh of three points."""
+    several = mesh().replace("[3]", f"[{', '.join(['3'] * faces)}]")
+    several = several.replace("[0, 1, 2]", f"[{', '.join(['0, 1, 2'] * faces)}]")
+    inner = 'def Scope "P" {\n' + several + "}\n"
     for _ in range(levels):
         zeros = ", ".join(["0"] * copies)
         places = ", ".join(["(0, 0, 0)"] * copies)
@@ -296,6 +308,16 @@ def rejected() -> dict[str, tuple[str, Upload]]:
         "bomb-prims-specializes.usdc": crate(bomb("specializes")),
         "bomb-ways.usda": doubled(30),
         "bomb-prims-huge.usda": bomb("references", 60, 8),
+        "bomb-clips.usda": clips(f'string templateAssetPath = "./c.##.usda"\n{ENDLESS}'),
+        "bomb-clips-in-layers.usdz": packages.plain(
+            {
+                "a.usda": usda(
+                    'over "Attack" (\nclips = {\ndictionary default = {\ndouble templateStride = 1e-9\n}\n}\n) {\n}',
+                    "subLayers = [@./b.usda@]",
+                ).encode(),
+                "b.usda": clips('string templateAssetPath = "./c.##.usda"\n' + TEMPLATE).encode(),
+            }
+        ),
         "bomb-braces.usda": "#usda 1.0\n" + 'def "a" {\n' * 3000 + "}\n" * 3000,
         "bomb-brackets.usda": attribute("float x = " + "(" * 20000 + ")" * 20000),
         "bomb-dictionaries.usda": usda("", "customLayerData = {\n" + "dictionary d = {\n" * 3000 + "}\n" * 3000 + "}"),
@@ -316,6 +338,11 @@ def rejected() -> dict[str, tuple[str, Upload]]:
         ),
         "texture-jpeg-bomb.usdz": packages.plain({"a.usda": textured("./t.jpg").encode(), "t.jpg": jpeg(65535, 65535)}),
         "texture-cut.usdz": packages.plain({"a.usda": textured("./t.png").encode(), "t.png": png()[:20]}),
+        "texture-no-palette.usdz": packages.plain({"a.usda": textured("./t.png").encode(), "t.png": palette(None)}),
+        "texture-odd-palette.usdz": packages.plain({"a.usda": textured("./t.png").encode(), "t.png": palette(b"1234")}),
+        "texture-odd-depth.usdz": packages.plain(
+            {"a.usda": textured("./t.png").encode(), "t.png": palette(b"123456", depth=16)}
+        ),
         "texture-no-image.usdz": packages.plain({"a.usda": textured("./t.png").encode(), "t.png": b"canary"}),
     }
     damaged = {
@@ -361,6 +388,7 @@ def rejected_by_child() -> dict[str, tuple[str, Upload]]:
         "geometry-far.usda": ("scene-damaged", usda(sheet=mesh(far))),
         "bomb-instancers.usda": ("scene-too-large", instancers(4, 120)),
         "bomb-copies.usda": ("scene-too-large", instancers(3, 300)),
+        "bomb-triangles.usda": ("scene-too-large", instancers(3, 130, 30)),
     }
 
 
@@ -385,6 +413,7 @@ def accepted() -> dict[str, Upload]:
         "package.usdz": packages.plain({"a.usda": usda().encode()}),
         "package-crate.usdz": packages.plain({"a.usdc": crate(usda())}),
         "package-texture.usdz": packages.plain({"a.usda": textured("./t/b.png").encode(), "t/b.png": png()}),
+        "package-palette.usdz": packages.plain({"a.usda": textured("t.png").encode(), "t.png": palette(b"123456")}),
         "package-search-path.usdz": packages.plain({"a.usda": textured("t/b.png").encode(), "t/b.png": png()}),
         "package-layers.usdz": packages.plain(
             {

@@ -147,7 +147,7 @@ def test_a_rejected_scene_ends_with_the_reason(
     assert run(["scenes", "upload", "glass.usdz"]) == ExitCode.CHECK_FAILED
     captured = capsys.readouterr()
     assert "rejected" in captured.out
-    assert "The server rejects glass.usdz: It is [2J no scene.\nExport it again." in captured.err
+    assert "The server rejects glass.usdz: It is\\x1b[2J no scene.\nExport it again." in captured.err
 
 
 @pytest.mark.parametrize(
@@ -241,11 +241,14 @@ def test_what_must_not_happen_twice_is_not_repeated(server: FakeServer) -> None:
         (401, "unauthenticated", ExitCode.AUTH),
         (403, "forbidden", ExitCode.AUTH),
         (404, "not-found", ExitCode.NOT_FOUND),
+        (408, "too-slow", ExitCode.TRY_AGAIN),
         (409, "conflict", ExitCode.CONFLICT),
         (413, "too-large", ExitCode.LIMIT),
+        (431, "headers-too-large", ExitCode.LIMIT),
         (422, "invalid", ExitCode.USAGE),
         (422, "check-failed", ExitCode.CHECK_FAILED),
         (500, "internal", ExitCode.CHECK_FAILED),
+        (507, "storage-full", ExitCode.TRY_AGAIN),
     ],
 )
 def test_problems_of_the_server_end_with_their_status(
@@ -389,7 +392,7 @@ def test_watching_ends_as_the_job_does(
     assert submit(server, "--watch") == status
     captured = capsys.readouterr()
     assert "render: 4/4 (1 skipped)" in captured.err
-    assert "Rendering.  Still." in captured.err
+    assert "Rendering. \\u2028Still." in captured.err
     assert captured.err.count("Rendering.") == 1
     assert str(outcome["state"]) in captured.out
     if status is ExitCode.CHECK_FAILED:

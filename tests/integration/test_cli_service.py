@@ -84,7 +84,7 @@ def test_a_rejected_scene_says_why(folder: Path, capsys: pytest.CaptureFixture[s
 
 def test_workers_data_sets_and_measurements_are_shown(capsys: pytest.CaptureFixture[str]) -> None:
     roles = {queue["role"] for queue in answer(["workers"], capsys)["queues"]}
-    assert roles == {"jobs", "render", "label", "train"}
+    assert roles == {"jobs", "render", "label", "train", "check"}
     assert answer(["datasets", "list"], capsys) == {"datasets": []}
     assert (
         answer(["measurements", "--technique", "kbuffer", "--since", "2026-01-01T00:00"], capsys)["measurements"] == []

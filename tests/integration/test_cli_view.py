@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from support.release_server import KEY, ReleaseServer
-from support.releases import record_of, serve
+from support.releases import SIGNER, STRANGER, record_of, serve
 from support.training import export_random, random_weights, real_features
 
 from diaphane_client import server as client_server
@@ -199,7 +199,7 @@ def test_a_model_is_fetched_from_a_service_and_kept_for_when_it_is_away(
 ) -> None:
     publish(server, bundles[0], "1.0.0")
     asked = ["--budget", "0.6", "--layout", "single"]
-    at = ["--model", "glass@champion", "--url", server.url]
+    at = ["--model", "glass@champion", "--url", server.url, "--public-key", SIGNER.public_key]
     (fetched,) = rows(capsys, scene, *at, *asked)
     (local,) = rows(capsys, scene, "--bundle", str(bundles[0]), *asked)
     assert fetched["technique"] == "kbuffer-deep"
@@ -217,6 +217,7 @@ def test_a_model_that_cannot_be_had_is_a_problem(
     publish(server, bundles[0], "1.0.0")
     common = ["view", str(scene), "--frames", "1", "--out", "o", "--url", server.url, "--model"]
     assert run([*common, "mirror@champion"]) == ExitCode.NOT_FOUND
+    assert run([*common, "glass", "--public-key", STRANGER.public_key]) == ExitCode.CHECK_FAILED
     monkeypatch.setenv("DIAPHANE_KEY", "dia_other")
     assert run([*common, "glass"]) == ExitCode.AUTH
     server.stop()
@@ -238,6 +239,8 @@ def test_later_versions_of_the_alias_come_by_themselves(
         newer = source.later.get(timeout=30.0)
         assert newer.name == "1.1.0"
         assert source.newest() is None
+        publish(server, bundles[0], "1.0.0")
+        assert source.later.get(timeout=30.0).name == "1.0.0"
     local = LocalScene(scene, scene, LoadOptions())
     local.at(None)
     assert Studio(local.gpu(), Needs(), (1.0, 1.0, 1.0), 0.5).load(newer) == load_manifest(bundles[1]).tail
@@ -254,6 +257,7 @@ def test_later_versions_of_the_alias_come_by_themselves(
         (["-t", "kbuffer-deep"], ExitCode.USAGE, "--model"),
         (["--model", "a@b", "--bundle", "c"], ExitCode.USAGE, "Both"),
         (["--watch", "--bundle", "c"], ExitCode.USAGE, "--watch"),
+        (["--public-key", "AAAA", "--bundle", "c"], ExitCode.USAGE, "--model"),
         (["--camera", "a", "--view", "b"], ExitCode.USAGE, "Both"),
         (["--view", "nobody"], ExitCode.NOT_FOUND, "nobody"),
         (["--frames", "1", "--out", "o", "--csv", __file__], ExitCode.USAGE, "no file of statistics"),

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
 import io
 import re
 import time
-from collections.abc import AsyncIterator
 from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 import sqlalchemy as sa
@@ -23,7 +19,7 @@ from support.dashboard import HOSTILE, ORIGIN, Shown, Visitor, fill
 from support.postgres import Postgres
 
 from services.api.routes import GUARDED, OPEN, routes
-from services.dashboard import OPEN_PAGES, PAGES, SESSION_ANSWERS, assets, live, models
+from services.dashboard import OPEN_PAGES, PAGES, SESSION_ANSWERS, assets, models
 from services.dashboard.page import duration, is_local
 from services.dashboard.sessions import form_token
 from services.database import Database, tables
@@ -151,12 +147,12 @@ def test_a_session_ends(empty: Api, end: str) -> None:
 def test_wrong_keys_are_refused_and_only_so_many_heard(tmp_path: Path) -> None:
     api = Api(tmp_path, rate=0.001, burst=8)
     visitor = Visitor(api, None)
-    answers = [visitor.sign_in(f"dia_{n}") for n in range(3)]
+    answers = [visitor.sign_in(f"dia_00000000000{n}_{'a' * 43}") for n in range(3)]
     assert [answer.status_code for answer in answers] == [401, 401, 429]
     assert "unknown, expired or revoked" in answers[0].text
     assert "Too many requests" in answers[2].text
     assert answers[2].headers["retry-after"]
-    assert "dia_0" not in answers[0].text
+    assert "dia_0000" not in answers[0].text
 
 
 def test_pages_count_for_the_key(tmp_path: Path) -> None:
@@ -631,28 +627,14 @@ def test_streams_tell_of_changes(api: Api, shown: Shown) -> None:
     assert watch._look() != before
 
 
-def test_a_stream_ends_where_nobody_can_tell_of_its_session(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Then the page asks by itself, and says that the database is away."""
-
-    def fail(_: str) -> None:
-        raise OperationalError("select", {}, Exception("gone"))
-
-    async def source() -> AsyncIterator[bytes]:
-        while True:
-            yield b"still here"
-
-    async def heard(find: Any) -> int:
-        state = SimpleNamespace(sessions=SimpleNamespace(find=find))
-        request: Any = SimpleNamespace(app=SimpleNamespace(state=state), cookies={"diaphane_session": "x"})
-        number = 0
-        async for _ in live.while_signed_in(request, source()):
-            number += 1
-            if number == 3:
-                break
-        return number
-
-    monkeypatch.setattr(live, "HEARTBEAT_SECONDS", 0.0)
-    assert [asyncio.run(heard(find)) for find in (lambda _: "a key", lambda _: None, fail)] == [3, 0, 0]
+def test_signs_that_hide_others_are_written_out_on_every_page(tmp_path: Path) -> None:
+    """`gpj.exe` after U+202E reads as a picture."""
+    api = Api(tmp_path, rate=1e6, burst=10**6)
+    shown = fill(api, tmp_path, "bottle\u202egpj.exe \u2066\u200b\x9b")
+    admin = Visitor(api)
+    texts = [admin.get(path).text for path in _pages(shown)]
+    assert not any(sign in text for text in texts for sign in "\u202e\u2066\u200b\x9b")
+    assert sum("bottle\\u202egpj.exe \\u2066\\u200b\\x9b" in text for text in texts) >= 3
 
 
 def test_durations_and_addresses() -> None:

@@ -11,10 +11,11 @@ import sqlalchemy as sa
 from dbos import DBOS, DBOSConfig, DBOSPortableJSONSerializer
 
 from services.database import Database, open_database, tables
+from services.database.clock import clock
 from services.engine import flow, queues, system
 from services.engine.claims import Claims
 from services.engine.jobs import Jobs
-from services.engine.liveness import Liveness, clock, host
+from services.engine.liveness import Liveness, host
 from services.settings import Settings
 
 ID = "job_x.1/0/0"

@@ -222,3 +222,40 @@ def test_identical_submissions_at_the_same_moment_are_one_job(fleet: Fleet) -> N
     assert len({job_id for job_id, _ in found}) == 1
     assert sum(new for _, new in found) == 1
     assert len(fleet.jobs.list()) == 1
+
+
+def test_uploads_that_take_all_their_time_hold_up_neither_another_key_s_nor_a_task(sqlite_fleet: Fleet) -> None:
+    fleet = sqlite_fleet
+    fleet.worker(*ALL, CHECK_SECONDS="600").ready()
+    slow = [fleet.send("key_a", f"slow {number}") for number in range(3)]
+    until(lambda: fleet.jobs.queues()[-1].running == 1)
+    good = fleet.send("key_b", "good")
+    until(lambda: fleet.checked(good) == "accepted")
+    assert fleet.wait(fleet.submit("a", _tasks("render", 1))).state == "succeeded"
+    assert [fleet.checked(scene_id) for scene_id in slow] == ["checking"] * 3
+    assert (fleet.jobs.queues()[-1].running, fleet.jobs.queues()[-1].queued) == (1, 2)
+
+
+def test_a_key_s_uploads_are_checked_one_after_the_other_by_the_clock(sqlite_fleet: Fleet) -> None:
+    fleet = sqlite_fleet
+    fleet.worker(*ALL, CHECK_SECONDS="2").ready()
+    sent = [fleet.send("key_a", text) for text in ("slow", "bad", "crash", "good")]
+    until(lambda: fleet.checked(sent[-1]) == "accepted")
+    assert [fleet.checked(scene_id) for scene_id in sent] == ["rejected", "rejected", "rejected", "accepted"]
+
+
+def test_the_rooms_of_a_killed_worker_are_removed_by_whoever_comes_next(sqlite_fleet: Fleet) -> None:
+    fleet = sqlite_fleet
+    work = fleet.folder / "work"
+    first = fleet.worker(*ALL).ready()
+    fleet.submit("a", _tasks("render", 1, sleep=30.0))
+    until(lambda: fleet.begun("render0"))
+    rooms = [folder for folder in work.iterdir() if list(folder.glob("render-*/made"))]
+    first.kill()
+    assert len(rooms) == 1
+    assert rooms[0].exists()
+    second = fleet.worker(*ALL).ready()
+    assert not rooms[0].exists()
+    assert len([folder for folder in work.iterdir() if list(folder.glob(".lock"))]) == 1
+    assert second.stop() == 0
+    assert [folder.name for folder in work.iterdir() if folder.is_dir()] == ["kernels"]

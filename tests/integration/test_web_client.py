@@ -511,6 +511,7 @@ def test_the_registry_answers_to_a_session_as_to_a_key(api: Api) -> None:
     assert {route.path for router in SESSION_ANSWERS for route in router.routes} == {  # type: ignore[attr-defined]
         "/demo/v1/models",
         "/demo/v1/models/{name}/versions/{version}",
+        "/demo/v1/models/{name}/pointers/{version}",
         "/demo/v1/blobs/sha256/{sha256}",
     }
     for path in paths:
@@ -519,6 +520,10 @@ def test_the_registry_answers_to_a_session_as_to_a_key(api: Api) -> None:
             assert stranger.status_code == 401  # a key is none here
             assert stranger.headers["content-type"] == "application/problem+json"
         assert visitor.client.post(f"/demo/v1{path}").status_code == 405
+    pointer = visitor.get("/demo/v1/models/glass/pointers/champion")
+    assert pointer.headers["cache-control"] == "no-store"
+    assert pointer.json().keys() == api.get("/v1/models/glass/pointers/champion").json().keys()
+    assert Visitor(api, None).client.get("/demo/v1/models/glass/pointers/champion").status_code == 401
 
 
 def test_the_build_is_small() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -59,9 +59,9 @@ class Api:
         return self.request("POST", path, scope, **options)
 
     @contextmanager
-    def served(self) -> Iterator[str]:
+    def served(self, proxies: Sequence[str] = ()) -> Iterator[str]:
         """URL of a real server."""
-        server = server_of(self.app, "127.0.0.1", 0)
+        server = server_of(self.app, "127.0.0.1", 0, proxies)
         thread = threading.Thread(target=server.run, daemon=True)
         thread.start()
         end = time.monotonic() + 30.0

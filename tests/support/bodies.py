@@ -14,7 +14,7 @@ from typing import Any
 from schemas.job import JobSpec, Priority
 from schemas.problem import ExitCode, Problem
 from services.stages.desk import FolderOf
-from services.store import Store
+from services.store import MissingArtifact, Store
 from services.tasks import FACTS, Report, Runner, Task
 
 PLANS = "ENGINE_PLANS"
@@ -60,8 +60,8 @@ def make(task: Task, store: Store, folder_of: FolderOf, report: Report) -> None:
         store.fetch(need)
     if before < params.get("times", 1_000_000):
         if params.get("fault") == "lose-need":
-            store.remove(task.needs[0])
-            store.fetch(task.needs[0])
+            Store(trace.parent / "store").remove(task.needs[0])  # the service's, not what lies ready for this task
+            raise MissingArtifact(task.needs[0])
         _FAULTS.get(params.get("fault", "none"), _FAULTS["none"])()
     end = time.monotonic() + params.get("sleep", 0.0)
     while time.monotonic() < end:
@@ -76,6 +76,8 @@ def inspect(folder: Path, root: str) -> dict[str, Any]:
     text = (folder / root).read_text()
     if text == "crash":
         os.kill(os.getpid(), signal.SIGSEGV)
+    if text.startswith("slow"):
+        time.sleep(600.0)
     if text == "bad":
         raise Problem("The scene is bad.", "Send a good one.")
     return {"triangles": len(text)}

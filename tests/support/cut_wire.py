@@ -13,7 +13,7 @@ class CutWire(httpx.BaseTransport):
     """Serves records and blobs as `ReleaseServer` does, as long as there are bytes left.
 
     Args:
-        records: `NAME/versions/SELECTOR` -> body.
+        records: `NAME/versions/VERSION`, `NAME/pointers/SELECTOR` -> body.
         blobs: sha256 -> bytes.
 
     Attributes:
@@ -33,7 +33,7 @@ class CutWire(httpx.BaseTransport):
         path = request.url.path
         if path.startswith("/v1/models/"):
             body = self.records[path.removeprefix("/v1/models/")]
-            return httpx.Response(200, stream=_Body(self, body), headers={"ETag": f'"{len(body)}"'})
+            return httpx.Response(200, stream=_Body(self, body))
         body = self.blobs[path.removeprefix("/v1/blobs/sha256/")]
         start = int(request.headers.get("Range", "bytes=0-").removeprefix("bytes=").removesuffix("-"))
         headers = {"Content-Range": f"bytes {start}-{len(body) - 1}/{len(body)}"} if start else {}

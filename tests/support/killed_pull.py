@@ -25,7 +25,7 @@ from diaphane_client import server as client_server
 from support.cut_wire import CutWire
 
 URL = "http://registry.test"
-_MODULES = ("pulling", "cache", "files", "server")
+_MODULES = ("pulling", "cache", "files", "server", "trust", "trust_file")
 TRACED = (*(f"diaphane_client/{name}.py" for name in _MODULES), "/shutil.py")
 """Where the folder is changed."""
 

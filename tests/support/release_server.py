@@ -11,10 +11,10 @@ KEY = "dia_0123456789ab_" + "x" * 43
 
 
 class ReleaseServer:
-    """Serves records of versions and blobs.
+    """Serves records of versions, statements of what aliases mean, and blobs.
 
     Attributes:
-        records: `NAME/versions/SELECTOR` -> body.
+        records: `NAME/versions/VERSION`, `NAME/pointers/SELECTOR` -> body.
         blobs: sha256 -> bytes; not checked.
         cuts: Bytes of blobs after which the next connections are cut, in order; later ones are not.
         ranges: Whether it knows ranges.
@@ -79,13 +79,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._blob(server.blobs.get(self.path.removeprefix("/v1/blobs/sha256/")))
 
     def _record(self, body: bytes | None) -> None:
-        if body is None:
-            self._answer(HTTPStatus.NOT_FOUND, b"")
-            return
-        etag = f'"{hash(body):x}"'
-        unchanged = self.headers.get("If-None-Match") == etag
-        status = HTTPStatus.NOT_MODIFIED if unchanged else HTTPStatus.OK
-        self._answer(status, b"" if unchanged else body, {"ETag": etag})
+        self._answer(HTTPStatus.NOT_FOUND if body is None else HTTPStatus.OK, body or b"")
 
     def _blob(self, body: bytes | None) -> None:
         if body is None:

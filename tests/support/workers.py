@@ -12,9 +12,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
+import sqlalchemy as sa
+
 from schemas.job import FINAL_STATES, Priority
-from schemas.service import JobRecord, SceneRecord
+from schemas.service import JobRecord
 from services.database import open_database
+from services.database.tables import scenes
 from services.engine.jobs import Jobs
 from services.settings import Settings
 from support import bodies
@@ -70,6 +73,20 @@ class Fleet:
         """Queues a job with this plan."""
         self.plan(name, *parts)
         return self.jobs.submit(bodies.spec(name, priority), submitted_by="key_test")[0].id
+
+    def send(self, key: str, text: str) -> str:
+        """Has a scene checked that has such a text (`bodies.inspect`); its id."""
+        from services.scenes import Scenes
+        from services.storage import open_storage
+
+        blobs = open_storage(self.settings).blobs
+        sent = Scenes(self.database, blobs, self.jobs)
+        return sent.create("sent", "a.usda", {"a.usda": blobs.put_bytes(text.encode()).sha256}, key)[0].id
+
+    def checked(self, scene_id: str) -> str:
+        """State of a scene."""
+        with self.database.read() as connection:
+            return str(connection.scalar(sa.select(scenes.c.state).where(scenes.c.id == scene_id)))
 
     def trace(self) -> list[tuple[float, str, int, int]]:
         """See `bodies.trace`."""
@@ -160,18 +177,12 @@ def alive(pid: int) -> bool:
     return state not in ("Z", "X")
 
 
-class NoScenes:
-    """Scenes for jobs that have none."""
-
-    def many(self, ids: Sequence[str]) -> dict[str, SceneRecord]:
-        return {}
-
-
 def main() -> None:
     """Runs until it is told to stop."""
     import threading
 
     from services.engine.runtime import Bodies, Parts, Runtime
+    from services.scenes import Scenes
     from services.storage import open_storage
 
     settings = Settings()
@@ -179,7 +190,9 @@ def main() -> None:
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: stop.set())
     names = Bodies("support.bodies:run_job", "support.bodies:make", "support.bodies:inspect", "", retry_seconds=0.1)
-    parts = Parts(open_storage(settings), None, None, NoScenes())  # type: ignore[arg-type]
+    storage, database = open_storage(settings), open_database(settings.database_url)
+    sent = Scenes(database, storage.blobs, Jobs(settings, database))
+    parts = Parts(storage, None, None, sent)  # type: ignore[arg-type]
     runtime = Runtime(settings, sys.argv[1:], names, parts)  # type: ignore[arg-type]
     runtime.start()
     print(READY, flush=True)

@@ -90,7 +90,14 @@ typedef struct {
 } DiaphaneSolution;
 
 /* Read and verify a bundle folder: the manifest, size and SHA-256 of every file, the weights. On failure nothing is
- * left to free. */
+ * left to free.
+ *
+ * It finds out whether the folder is whole, not whose it is. Before, the caller must have checked, or have had the
+ * Python client check (deploy/client/python, "What is verified"):
+ * - that manifest.json has the size and SHA-256 that the signed statement of the version gives it;
+ * - that this statement has the digest that the pointer of the alias names, and both have the signature of the trusted
+ *   key, or of one that it handed over to;
+ * - that the pointer is not expired, is about this name and alias, and has no lower serial than was seen before. */
 int diaphane_load(DiaphaneBundle *bundle, const char *folder, DiaphaneError *error);
 
 /* The same from memory: manifest.json and weights.safetensors; no other file is looked at. */

@@ -3,7 +3,7 @@
 Runs inside the service's processes. Points:
 
     STAGE:begin STAGE:end     in the body of a stage: before its work, and before its files become an artifact
-    STAGE:kept                the artifact is there, and the worker does not know yet
+    STAGE:kept                in the worker: it has taken the artifact over, and nobody else knows yet
     map:STAGE:begin, :end     in the process that conducts the job: around a stage
     publish:begin, :middle, :end   around a publication; in the middle its files are there and its row is not;
                               at the end it is published, and the job does not know yet
@@ -116,16 +116,6 @@ def _around(owner: Any, name: str, point: Callable[..., str], *, begin: bool = T
     setattr(owner, name, wrapped)
 
 
-def _change_bodies(module: Any) -> None:
-    make_at = module.make_at
-
-    def wrapped(desk: Any, task: Any, report: Any) -> None:
-        make_at(desk, task, report)
-        reach(f"{task.stage}:kept", artifact=task.artifact)
-
-    module.make_at = wrapped
-
-
 def _change_runner(module: Any) -> None:
     _around(module.DurableRunner, "map", lambda stage, *_: f"map:{stage}")
     _around(module.DurableRunner, "step", lambda name, *_: f"step:{name.replace(' ', '-')}", begin=False)
@@ -147,8 +137,14 @@ def _change_jobs(module: Any) -> None:
 
 
 def _change_store(module: Any) -> None:
-    """Where no small disk can be mounted, a file says that the disk is full."""
-    sync_tree = module.sync_tree
+    """A worker takes an artifact over; and where no small disk can be mounted, a file says that the disk is full."""
+    sync_tree, adopt = module.sync_tree, module.Store.adopt
+
+    def adopted(self: Any, folder: Any, artifact: str) -> None:
+        adopt(self, folder, artifact)
+        reach(f"{artifact.partition('/')[0]}:kept", artifact=artifact)
+
+    module.Store.adopt = adopted
 
     def wrapped(folder: Any) -> None:
         if os.path.exists(f"{_folder}/{FULL}"):  # noqa: PTH110
@@ -159,7 +155,6 @@ def _change_store(module: Any) -> None:
 
 
 _CHANGES: dict[str, Callable[[Any], None]] = {
-    "services.stages.bodies": _change_bodies,
     "services.engine.runner": _change_runner,
     "services.registry.registry": _change_registry,
     "services.engine.jobs": _change_jobs,

@@ -16,10 +16,12 @@ import pytest
 from support.cut_wire import CutWire
 from support.killed_pull import URL, is_whole
 from support.release_server import ReleaseServer
-from support.releases import Record, publish
+from support.releases import publish
 
 from diaphane_client import Unavailable, cached, pull
 from diaphane_client import server as client_server
+
+Answers = dict[str, bytes]
 
 POINTS = 100
 KILLS = 40
@@ -27,25 +29,26 @@ ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
-def releases(tmp_path: Path) -> tuple[Record, Record, CutWire]:
-    """Records of two versions, the second one now the champion, and the wire that they come by."""
+def releases(tmp_path: Path) -> tuple[Answers, Answers, CutWire]:
+    """Answers before and after a second version became the champion, and the wire that they come by."""
     server = ReleaseServer()
-    first = publish(server, tmp_path, "1.0.0")
+    publish(server, tmp_path, "1.0.0")
     server.stop()
-    second = publish(server, tmp_path, "1.1.0")
-    return first, second, CutWire(server.records, server.blobs)
+    first = dict(server.records)
+    publish(server, tmp_path, "1.1.0")
+    return first, server.records, CutWire(server.records, server.blobs)
 
 
 @pytest.fixture
-def before(releases: tuple[Record, Record, CutWire], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def before(releases: tuple[Answers, Answers, CutWire], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The folder of a pull of the first version, by that wire."""
     first, _, wire = releases
     monkeypatch.setattr(client_server, "FIRST_WAIT", 0.0)
     monkeypatch.setattr(httpx, "Client", functools.partial(httpx.Client, transport=wire))
     monkeypatch.setattr(os, "fsync", lambda _: None)
-    champion, wire.records = wire.records, {"glass/versions/champion": json.dumps(first).encode()}
+    after, wire.records = wire.records, first
     pull("glass", url=URL, key=None, folder=tmp_path / "before")
-    wire.records, wire.carried = champion, 0
+    wire.records, wire.carried = after, 0
     return tmp_path / "before"
 
 
@@ -57,13 +60,15 @@ def versions(bundles: Path) -> list[str]:
 
 
 def test_a_transport_cut_at_any_byte_leaves_the_old_bundle_and_its_bytes_are_not_fetched_again(
-    releases: tuple[Record, Record, CutWire], before: Path, tmp_path: Path
+    releases: tuple[Answers, Answers, CutWire], before: Path, tmp_path: Path
 ) -> None:
-    _, record, wire = releases
+    _, after, wire = releases
     drawn = random.Random(1)
-    total = len(json.dumps(record)) + sum(file["bytes"] for file in record["files"].values())
+    answers = len(after["glass/pointers/champion"]) + len(after["glass/versions/1.1.0"])
+    files = json.loads(after["glass/versions/1.1.0"])["files"].values()
+    total = answers + sum(file["bytes"] for file in files)
     cuts = sorted(drawn.sample(range(total), POINTS))
-    assert cuts[0] < len(json.dumps(record)) < cuts[10]
+    assert cuts[0] < answers < cuts[15]
     for cut in cuts:
         bundles = tmp_path / "bundles"
         shutil.rmtree(bundles, ignore_errors=True)
@@ -75,11 +80,11 @@ def test_a_transport_cut_at_any_byte_leaves_the_old_bundle_and_its_bytes_are_not
         wire.left = None
         assert pull("glass", url=URL, key=None, folder=bundles).name == "1.1.0"
         assert versions(bundles) == ["1.0.0", "1.1.0"]
-        assert wire.carried <= total + len(json.dumps(record))  # the record comes twice, the files once
+        assert wire.carried <= total + answers  # the answers come twice, the files once
 
 
 def test_a_first_pull_that_is_cut_leaves_nothing_to_be_seen(
-    releases: tuple[Record, Record, CutWire], before: Path, tmp_path: Path
+    releases: tuple[Answers, Answers, CutWire], before: Path, tmp_path: Path
 ) -> None:
     _, _, wire = releases
     bundles = tmp_path / "bundles"
@@ -94,7 +99,7 @@ def test_a_first_pull_that_is_cut_leaves_nothing_to_be_seen(
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_process_killed_at_any_line_leaves_the_old_bundle_or_the_new_one(
-    releases: tuple[Record, Record, CutWire], before: Path, tmp_path: Path
+    releases: tuple[Answers, Answers, CutWire], before: Path, tmp_path: Path
 ) -> None:
     wire = releases[2]
     content = {"records": wire.records, "blobs": wire.blobs}

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import itertools
-import json
 import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from support.release_server import KEY, ReleaseServer
-from support.releases import STRANGER, Record, publish, serve
+from support.releases import STRANGER, Record, pointer_to, publish, serve, state
 
-from diaphane_client import Denied, NotFound, Unavailable, watch
+from diaphane_client import Denied, NotFound, Unavailable, pulling, watch
 from diaphane_client import server as client_server
 
 EVERY = 0.02
@@ -70,7 +70,7 @@ def test_every_new_bundle_is_given_once(server: ReleaseServer, tmp_path: Path) -
     with Watched(server, tmp_path) as watched:
         watched.until(lambda: watched.found == ["1.0.0"])
         watched.until_asked(server)
-        assert all("If-None-Match" in headers for _, headers in server.requests[-2:])
+        assert all(path.endswith("/pointers/champion") for path, _ in server.requests[-2:])
         publish(server, tmp_path, "1.1.0")
         watched.until(lambda: watched.found == ["1.0.0", "1.1.0"])
         watched.until_asked(server)
@@ -83,6 +83,7 @@ def test_every_new_bundle_is_given_once(server: ReleaseServer, tmp_path: Path) -
 def test_a_server_that_fails_lies_or_goes_away_is_asked_on_and_logged_once(
     server: ReleaseServer, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
+    older = pointer_to(publish(server, tmp_path, "1.0.0"))
     good = publish(server, tmp_path, "1.1.0")
 
     def down() -> None:
@@ -91,11 +92,17 @@ def test_a_server_that_fails_lies_or_goes_away_is_asked_on_and_logged_once(
     def locked_out() -> None:
         server.status = 403
 
-    def unsigned() -> None:
-        server.records["glass/versions/champion"] = json.dumps({**good, "signature": ""}).encode()
+    def never_modified() -> None:
+        server.status = 304
 
-    def older() -> None:
-        publish(server, tmp_path, "1.0.0")
+    def unsigned() -> None:
+        state(server, {**pointer_to(good), "signature": ""})
+
+    def replayed() -> None:
+        state(server, older)
+
+    def expired() -> None:
+        state(server, pointer_to(good, issued=time.time() - 10_000.0))
 
     def of_another_key() -> None:
         publish(server, tmp_path, "1.2.0", signer=STRANGER)
@@ -110,7 +117,7 @@ def test_a_server_that_fails_lies_or_goes_away_is_asked_on_and_logged_once(
 
     with Watched(server, tmp_path) as watched:
         watched.until(lambda: watched.found == ["1.1.0"])
-        for trouble in (down, locked_out, unsigned, older, of_another_key, damaged):
+        for trouble in (down, locked_out, never_modified, unsigned, replayed, expired, of_another_key, damaged):
             caplog.clear()
             trouble()
             watched.until(lambda: bool(said()))
@@ -125,10 +132,26 @@ def test_a_server_that_fails_lies_or_goes_away_is_asked_on_and_logged_once(
         watched.until(lambda: watched.found == ["1.1.0", "1.3.0"])
 
 
-def test_a_rollback_is_followed_where_that_is_allowed(server: ReleaseServer, tmp_path: Path) -> None:
+def test_a_clock_that_is_wrong_is_said_once_though_time_goes_on(
+    server: ReleaseServer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    good = publish(server, tmp_path, "1.0.0")
+    with Watched(server, tmp_path) as watched:
+        watched.until(lambda: watched.found == ["1.0.0"])
+        seconds = itertools.count(int(time.time()) + 10**6)
+        monkeypatch.setattr(pulling, "time", SimpleNamespace(time=lambda: next(seconds)))
+        for _ in range(3):
+            state(server, pointer_to(good, issued=next(seconds) - 10**6))
+            watched.until_asked(server, 4)
+        monkeypatch.undo()
+    said = [record.message for record in caplog.records if record.name.startswith("diaphane_client")]
+    assert [message.count("expired at") for message in said] == [1]
+
+
+def test_a_rollback_is_followed(server: ReleaseServer, tmp_path: Path) -> None:
     old = publish(server, tmp_path, "1.0.0")
     publish(server, tmp_path, "1.1.0")
-    with Watched(server, tmp_path, allow_rollback=True) as watched:
+    with Watched(server, tmp_path) as watched:
         watched.until(lambda: watched.found == ["1.1.0"])
         serve(server, old)
         watched.until(lambda: watched.found == ["1.1.0", "1.0.0"])

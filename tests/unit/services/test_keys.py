@@ -16,7 +16,7 @@ def test_a_secret_opens_and_is_stored_nowhere(database_url: str) -> None:
     keys = Keys(database)
     assert not keys.any()
     record, secret = keys.create("ci", ["submit"])
-    found = keys.authenticate(secret)
+    found = keys.authenticate(secret).key
     assert found is not None
     assert found.id == record.id
     assert keys.any()
@@ -29,13 +29,13 @@ def test_a_secret_opens_and_is_stored_nowhere(database_url: str) -> None:
 def test_anything_else_does_not_open(change: str, database_url: str) -> None:
     keys = Keys(open_database(database_url))
     keys.create("ci", ["submit"])
-    assert keys.authenticate(change) is None
+    assert keys.authenticate(change).key is None
 
 
 def test_the_secret_of_one_key_does_not_open_another(database_url: str) -> None:
     keys = Keys(open_database(database_url))
     (_, one), (_, other) = keys.create("one", ["read"]), keys.create("other", ["admin"])
-    assert keys.authenticate(f"{other[:17]}{one[17:]}") is None
+    assert keys.authenticate(f"{other[:17]}{one[17:]}").key is None
 
 
 def test_hashes_are_compared_in_constant_time_also_for_unknown_ids(
@@ -55,13 +55,13 @@ def test_a_revoked_key_and_an_expired_one_are_refused(database_url: str, monkeyp
     keys = Keys(open_database(database_url))
     record, secret = keys.create("ci", ["read"])
     _, short = keys.create("short", ["read"], expires=time.time() + 60.0)
-    assert keys.authenticate(short) is not None
+    assert keys.authenticate(short).key is not None
     first = keys.revoke(record.id)
-    assert keys.authenticate(secret) is None
+    assert keys.authenticate(secret).key is None
     assert keys.revoke(record.id).revoked == first.revoked
     now = time.time()
     monkeypatch.setattr(time, "time", lambda: now + 61.0)
-    assert keys.authenticate(short) is None
+    assert keys.authenticate(short).key is None
     assert not keys.any()
 
 

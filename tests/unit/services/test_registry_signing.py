@@ -19,7 +19,7 @@ from services.settings import Settings
 def test_the_key_is_made_once_and_only_its_owner_may_read_it(tmp_path: Path) -> None:
     settings = Settings(state=tmp_path / "state")
     with ThreadPoolExecutor(8) as pool:
-        keys = set(pool.map(lambda _: Signer.open(settings).public_key, range(8)))
+        keys = set(pool.map(lambda _: Signer.open(settings).key.public_key, range(8)))
     assert len(keys) == 1
     path = tmp_path / "state" / KEY_FILE
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
@@ -33,10 +33,10 @@ def test_opening_a_signer_writes_nothing(tmp_path: Path) -> None:
 
 def test_the_key_of_the_settings_is_used(tmp_path: Path) -> None:
     seed = base64.b64encode(os.urandom(32)).decode()
-    signer = Signer.open(Settings(state=tmp_path, signing_key=seed))
-    assert signer.public_key == Signer.open(Settings(state=tmp_path / "other", signing_key=seed)).public_key
-    assert verify(signer.public_key, "text", signer.sign("text"))
-    assert not verify(Signer.open(Settings(state=tmp_path)).public_key, "text", signer.sign("text"))
+    key = Signer.open(Settings(state=tmp_path, signing_key=seed)).key
+    assert key.public_key == Signer.open(Settings(state=tmp_path / "other", signing_key=seed)).key.public_key
+    assert verify(key.public_key, "text", key.sign("text"))
+    assert not verify(Signer.open(Settings(state=tmp_path)).key.public_key, "text", key.sign("text"))
 
 
 @pytest.mark.parametrize("key", ["x", "AAAA", base64.b64encode(bytes(31)).decode()])
@@ -49,4 +49,4 @@ def test_a_key_that_is_none_is_refused_and_not_shown(key: str, tmp_path: Path) -
 def test_a_damaged_key_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / KEY_FILE).write_bytes(b"\xff\x00")
     with pytest.raises(Problem, match=KEY_FILE):
-        _ = Signer.open(Settings(state=tmp_path)).public_key
+        _ = Signer.open(Settings(state=tmp_path)).key

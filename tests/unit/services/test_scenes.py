@@ -8,7 +8,7 @@ from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 from services.database import open_database
 from services.problems import Refusal, document_of
-from services.scenes import Scenes
+from services.scenes import QUOTA_CHECKS, Scenes
 from services.storage import Blobs
 
 
@@ -16,7 +16,7 @@ class _Checks:
     def __init__(self) -> None:
         self.asked: list[str] = []
 
-    def check_scene(self, scene_id: str) -> None:
+    def check_next(self, scene_id: str) -> None:
         self.asked.append(scene_id)
 
 
@@ -74,6 +74,17 @@ def test_files_that_were_not_uploaded_are_named(scenes: Scenes, sha256: str) -> 
 def test_a_path_that_could_lead_elsewhere_is_refused(path: str, scenes: Scenes, sha256: str) -> None:
     with pytest.raises(Problem, match="not a plain relative path"):
         scenes.create("one", path, {path: sha256}, "key_1")
+
+
+def test_a_key_has_so_many_scenes_waiting_and_another_one_is_not_concerned(scenes: Scenes, sha256: str) -> None:
+    made = [scenes.create("one", "a.usda", {"a.usda": sha256, f"{n}": sha256}, "key_1")[0] for n in range(QUOTA_CHECKS)]
+    with pytest.raises(Refusal) as refused:
+        scenes.create("one", "a.usda", {"a.usda": sha256, "more": sha256}, "key_1")
+    assert (refused.value.type.status, refused.value.headers) == (429, {"Retry-After": "10"})
+    assert scenes.create("known", "a.usda", {"a.usda": sha256, "0": sha256}, "key_1")[0].id == made[0].id
+    scenes.create("one", "a.usda", {"a.usda": sha256, "other": sha256}, "key_2")
+    scenes.resolve_check(made[0].id, {"triangles": 3})
+    scenes.create("one", "a.usda", {"a.usda": sha256, "more": sha256}, "key_1")
 
 
 @pytest.mark.parametrize("paths", [["a.usda", "A.usda"], ["a.usda", "a.usda/b.png"]])

@@ -26,3 +26,13 @@ def test_secrets_are_not_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DIAPHANE_DATABASE", "postgresql://u:hidden-word@h/d")
     monkeypatch.setenv("DIAPHANE_SIGNING_KEY", "hidden-word")
     assert "hidden-word" not in repr(Settings())
+
+
+def test_proxies_are_addresses_and_networks(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert Settings().trusted_proxies == ()
+    monkeypatch.setenv("DIAPHANE_PROXIES", "10.0.0.0/8, ::1")
+    assert Settings().trusted_proxies == ("10.0.0.0/8", "::1")
+    for wrong in ("*", "proxy.example", "10.0.0.1/8"):
+        monkeypatch.setenv("DIAPHANE_PROXIES", wrong)
+        with pytest.raises(Problem, match="DIAPHANE_PROXIES cannot be used"):
+            Settings()

@@ -18,8 +18,10 @@ from hypothesis import strategies as st
 from schemas.problem import ExitCode, Problem
 from services.settings import Settings
 from services.storage import MissingBlob, Storage, open_storage
+from services.storage import blobs as module
 from services.storage.blobs import Blobs
 from services.storage.remote import Remote
+from services.store import file_sha256
 
 UPLOAD = "upl_" + "ab" * 12
 Machine = Callable[[str], Storage]
@@ -107,6 +109,51 @@ def test_a_blob_that_is_damaged_in_the_object_store_is_removed_there(torn: bytes
     assert not two.has(name)
     two.put_bytes(b"data")
     assert b"".join(open_storage(Settings(state=tmp_path / "three", store=s3_url)).blobs.read(name)) == b"data"
+
+
+@pytest.mark.parametrize("known", [False, True], ids=["as it was stored", "handed out before"])
+def test_a_blob_of_the_same_size_and_times_is_hashed_before_it_is_handed_out(tmp_path: Path, known: bool) -> None:
+    """Also by the process that stored it: what lies there now is not what went through its hands."""
+    blobs = Blobs(tmp_path)
+    name = blobs.put_bytes(b"data").sha256
+    path = blobs.path(name) if known else blobs._path(name)
+    stat = path.stat()
+    path.write_bytes(b"DATA")
+    os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns))
+    assert (path.stat().st_size, path.stat().st_mtime_ns) == (stat.st_size, stat.st_mtime_ns)
+    with pytest.raises(MissingBlob):
+        blobs.path(name)
+
+
+def test_a_use_is_no_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    blobs = Blobs(tmp_path)
+    name = blobs.put_bytes(b"data").sha256
+    hashed = []
+    monkeypatch.setattr(module, "file_sha256", lambda path: hashed.append(path) or file_sha256(path))
+    monkeypatch.setattr(module, "TOUCH_SECONDS", -1.0)
+    for _ in range(3):
+        blobs.path(name)
+    assert len(hashed) == 1
+
+
+def test_a_store_that_is_away_says_so_and_not_that_a_blob_is_missing(tmp_path: Path) -> None:
+    blobs = Blobs(tmp_path / "store")
+    name = blobs.put_bytes(b"data").sha256
+    (tmp_path / "store").rename(tmp_path / "elsewhere")
+    for attempt in (
+        lambda: blobs.path(name),
+        lambda: blobs.has(name),
+        lambda: blobs.put_bytes(b"more"),
+        lambda: blobs.append_part(UPLOAD, 0, b"data"),
+        blobs.probe,
+    ):
+        with pytest.raises(Problem, match="cannot be reached") as away:
+            attempt()
+        assert away.value.code is ExitCode.TRY_AGAIN
+    (tmp_path / "elsewhere").rename(tmp_path / "store")
+    blobs.probe()
+    assert blobs.path(name).read_bytes() == b"data"
+    assert list((tmp_path / "store" / "tmp").iterdir()) == []
 
 
 def test_an_open_blob_is_read_to_its_end_although_it_is_removed(machine: Machine) -> None:

@@ -3,7 +3,7 @@
 from diaphane_client.allocation import Cuts, allocate, importance_curve
 from diaphane_client.errors import Denied, NotFound, PullError, Refused, Unavailable
 from diaphane_client.predictor import Predictor
-from diaphane_client.pulling import cached, pull
+from diaphane_client.pulling import cached, forget, pull
 from diaphane_client.watching import watch
 
 __all__ = [
@@ -16,6 +16,7 @@ __all__ = [
     "Unavailable",
     "allocate",
     "cached",
+    "forget",
     "importance_curve",
     "pull",
     "watch",

@@ -1,11 +1,12 @@
 """The folder of fetched bundles.
 
-    known-keys.json                 server -> public key that it is trusted with
+    trust.json                      what was seen of servers and bundles: keys, what aliases meant, versions
     <name>/versions/<version>/      a bundle; complete and verified, or not there
-    <name>/aliases/<alias>.json     which version an alias meant at the last pull: record, signature, ETag
+    <name>/aliases/<alias>.json     record of the bundle that an alias meant at the last pull
     <name>/parts/<sha256>           downloads under way, which go on after a cut
 
-What is read from here is verified anew: hashes and signature.
+What is read from here is verified anew: against the hashes, and against what was seen. `trust.json` has no second copy.
+Where it is missing or damaged although there are bundles, nothing is fetched: what was seen before would not count.
 """
 
 from __future__ import annotations
@@ -13,24 +14,17 @@ from __future__ import annotations
 import json
 import shutil
 import uuid
-from collections.abc import Collection
+from collections.abc import Callable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 
-from diaphane_client.errors import PullError
+from diaphane_client.errors import PullError, Refused
 from diaphane_client.files import file_sha256, locked, sync_folder, write_whole
-from diaphane_client.release import Release, parse, verify
+from diaphane_client.release import Release, digest_of, parse
+from diaphane_client.trust import Trust, forget
+from diaphane_client.trust_file import dump_trust, parse_trust
 
-KNOWN_KEYS = "known-keys.json"
-
-
-@dataclass(frozen=True)
-class Pointer:
-    """What an alias meant at the last pull, and the ETag of the server's answer."""
-
-    release: Release
-    etag: str
+TRUST = "trust.json"
 
 
 class Cache:
@@ -42,7 +36,7 @@ class Cache:
     """
 
     def __init__(self, folder: Path, name: str) -> None:
-        self._keys = folder / KNOWN_KEYS
+        self._trust = folder / TRUST
         self._folder = folder / name
         self._name = name
 
@@ -56,32 +50,60 @@ class Cache:
         path.parent.mkdir(parents=True, exist_ok=True)
         return path
 
-    def known_key(self, server: str) -> str | None:
-        """The public key that a server is trusted with, base64; None before the first pull."""
-        key = self._known_keys().get(server)
-        return key if isinstance(key, str) else None
+    def trust(self) -> Trust:
+        """What was seen so far.
 
-    def pin_key(self, server: str, public_key: str) -> None:
-        """Trusts a server with a public key from now on."""
-        with locked(self._keys.with_name(f".{KNOWN_KEYS}.lock")):
-            keys = self._known_keys()
-            if keys.get(server) != public_key:
-                write_whole(self._keys, json.dumps({**keys, server: public_key}, indent=2, sort_keys=True).encode())
+        Raises:
+            Refused: It is damaged, or does not know of bundles that are there.
+        """
+        found = self._read_trust()
+        if self._name not in found.names and (self._folder / "versions").exists():
+            raise Refused(
+                f"There are bundles of '{self._name}' here, but {self._trust} does not know them.",
+                f"Restore that file; or call diaphane_client.forget('{self._name}', folder=...), and give the server's "
+                "public_key at the next pull.",
+            )
+        return found
 
-    def pointer(self, alias: str, trusted: Collection[str]) -> Pointer | None:
-        """What an alias meant at the last pull; None if there was none, or it is not signed with a trusted key."""
+    def learn(self, step: Callable[[Trust], Trust]) -> Trust:
+        """Replaces what was seen by what follows from it; no other process does so meanwhile.
+
+        Args:
+            step: From what was seen to what is kept.
+
+        Returns:
+            What is kept.
+
+        Raises:
+            Refused: As `trust`, and what `step` raises.
+            OSError: It cannot be written.
+        """
+        with self._trust_lock():
+            return self._write_trust(step, self.trust())
+
+    def forget(self) -> None:
+        """Makes the name as if it had never been seen.
+
+        Raises:
+            Refused: What was seen of others is damaged.
+            OSError: It cannot be written.
+        """
+        with self._trust_lock():
+            self._write_trust(lambda known: forget(known, self._name), self._read_trust())
+
+    def pulled(self, alias: str, trust: Trust) -> Release | None:
+        """The record of the bundle that an alias meant at the last pull; None if it is not one that was seen."""
         try:
-            content = json.loads((self._folder / "aliases" / f"{alias}.json").read_bytes())
-            release = parse(json.dumps(content["release"]).encode())
-            verify(release, self._name, alias, trusted)
-            return Pointer(release, str(content["etag"]))
-        except (OSError, ValueError, KeyError, TypeError, PullError):
+            release = parse((self._folder / "aliases" / f"{alias}.json").read_bytes())
+        except (OSError, PullError):
             return None
+        seen = trust.names.get(self._name)
+        is_known = seen is not None and seen.versions.get(release.version) == release.digest == digest_of(release)
+        return release if is_known else None
 
-    def point(self, alias: str, pointer: Pointer) -> None:
-        """Writes down what an alias means."""
-        content = {"release": pointer.release.as_json(), "etag": pointer.etag}
-        write_whole(self._folder / "aliases" / f"{alias}.json", json.dumps(content, indent=2).encode())
+    def point(self, alias: str, release: Release) -> None:
+        """Writes down which bundle an alias means."""
+        write_whole(self._folder / "aliases" / f"{alias}.json", json.dumps(release.as_json(), indent=2).encode())
 
     def bundle(self, release: Release) -> Path | None:
         """The folder of a release whose files are all there and have their hashes."""
@@ -93,18 +115,6 @@ class Cache:
         except OSError:
             return None
         return folder if intact else None
-
-    def is_taken(self, release: Release) -> bool:
-        """Whether an alias means a whole bundle of the same version with other files, such as another server's."""
-        trusted = [key for key in self._known_keys().values() if isinstance(key, str)]
-        found = (self.pointer(path.stem, trusted) for path in (self._folder / "aliases").glob("*.json"))
-        return any(
-            pointer.release.version == release.version
-            and pointer.release.digest != release.digest
-            and self.bundle(pointer.release)
-            for pointer in found
-            if pointer
-        )
 
     def keep(self, release: Release) -> Path:
         """Makes a bundle of complete, verified parts, in one step; replaces one that is damaged.
@@ -132,14 +142,23 @@ class Cache:
     def _bundle_folder(self, release: Release) -> Path:
         return self._folder / "versions" / release.version
 
-    def _known_keys(self) -> dict[str, object]:
+    def _trust_lock(self) -> AbstractContextManager[None]:
+        return locked(self._trust.with_name(f".{TRUST}.lock"))
+
+    def _read_trust(self) -> Trust:
         try:
-            keys = json.loads(self._keys.read_bytes())
+            return parse_trust(self._trust.read_bytes())
         except FileNotFoundError:
-            return {}
+            return Trust()
         except ValueError as error:
-            raise PullError(
-                f"The trusted keys in {self._keys} cannot be read.",
-                "Restore that file; if you remove it, the next pull trusts the key that the server then has.",
+            raise Refused(
+                f"What was seen of servers and bundles, {self._trust}, cannot be read.",
+                "Restore that file, or begin with an empty folder of bundles.",
             ) from error
-        return keys if isinstance(keys, dict) else {}
+
+    def _write_trust(self, step: Callable[[Trust], Trust], before: Trust) -> Trust:
+        after = step(before)
+        if after is not before:
+            write_whole(self._trust, dump_trust(after).encode())
+            sync_folder(self._trust.parent)
+        return after

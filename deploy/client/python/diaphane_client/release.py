@@ -1,6 +1,7 @@
 """A published version as the server describes it, believed only as far as its signature goes.
 
 Rules:
+- it is the version that the pointer names, with that digest, and signed with the same key;
 - the statement is the exact text that is signed; what the record says beside it must be the same;
 - the digest follows from the names and hashes of the files;
 - names of files are plain and versions are numbers, so that none leads out of its folder.
@@ -8,22 +9,19 @@ Rules:
 
 from __future__ import annotations
 
-import base64
 import hashlib
 import json
-import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from diaphane_client.ed25519 import is_signed
 from diaphane_client.errors import Refused
 from diaphane_client.manifest import MANIFEST, FileRef, parse_files, parse_manifest
+from diaphane_client.pointer import Pointer, version_order
+from diaphane_client.signatures import is_signed
 
 STATEMENT_FORMAT: Final = "diaphane-release/1"
 MAX_RECORD_BYTES: Final = 1 << 20
-
-_VERSION = re.compile(r"\.".join(3 * [r"(0|[1-9][0-9]{0,5})"]))
 
 _SERVED_WRONG = "Ask who runs the server: it may be misconfigured, or somebody may have tampered with it."
 
@@ -50,21 +48,10 @@ class Release:
     signature: str
     public_key: str
 
-    @property
-    def order(self) -> tuple[int, ...]:
-        """The version as numbers, to compare."""
-        return version_order(self.version)
-
     def as_json(self) -> dict[str, Any]:
         """What `parse` reads back."""
         files = {name: {"sha256": file.sha256, "bytes": file.bytes} for name, file in self.files.items()}
         return {**self.__dict__, "files": files}
-
-
-def version_order(version: str) -> tuple[int, ...]:
-    """A semantic version as numbers; empty if it is none."""
-    found = _VERSION.fullmatch(version)
-    return tuple(map(int, found.groups())) if found else ()
 
 
 def parse(content: bytes) -> Release:
@@ -79,7 +66,7 @@ def parse(content: bytes) -> Release:
         if not all(isinstance(text, str) for text in texts.values()):
             raise TypeError("a text is not one")
         release = Release(**texts, files=parse_files(record["files"]))
-        if MANIFEST not in release.files or not release.order:
+        if MANIFEST not in release.files or not version_order(release.version):
             raise ValueError("there is no manifest, or no version")
         return release
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
@@ -88,36 +75,39 @@ def parse(content: bytes) -> Release:
         ) from error
 
 
-def verify(release: Release, name: str, selector: str, trusted: Collection[str]) -> None:
-    """Checks that a release is what was asked for, and signed with a trusted key.
+def verify(release: Release, pointer: Pointer) -> None:
+    """Checks that a release is what a pointer names, and that its signature holds.
 
     Args:
         release: As the server describes it.
-        name: Name that was asked for.
-        selector: Version or alias that was asked for.
-        trusted: Public keys, base64.
+        pointer: Is believed.
 
     Raises:
         Refused: It is not.
     """
-    if release.public_key not in trusted:
+    name = pointer.name
+    if (release.name, release.version, release.digest) != (name, pointer.version, pointer.digest):
         raise Refused(
-            f"'{name}' is signed with the key {release.public_key}, which is not the one that is trusted here.",
-            "If the server's key was changed on purpose, give the new one as public_key once, or take the server from "
-            "known-keys.json in the folder of bundles.",
+            f"The server sent '{release.name}' {release.version}, and states that '{name}' {pointer.selector} is "
+            f"{pointer.version} with other files.",
+            _SERVED_WRONG,
         )
-    if not _is_signed(release):
+    if release.public_key != pointer.public_key:
+        raise Refused(
+            f"'{name}' {release.version} is signed with the key {release.public_key}, and the statement that names it "
+            f"with {pointer.public_key}.",
+            "If the server's key was changed a moment ago, try again; else ask who runs it.",
+        )
+    if not is_signed(release.public_key, release.statement, release.signature):
         raise Refused(f"The signature of '{name}' {release.version} is wrong.", _SERVED_WRONG)
-    statement = json.loads(release.statement)
     described = {path: {"sha256": file.sha256, "bytes": file.bytes} for path, file in release.files.items()}
     signed: dict[str, object] = {"format": STATEMENT_FORMAT, "name": name, "version": release.version}
     signed |= {"digest": release.digest, "files": described}
+    statement = _parsed(release.statement)
     if not isinstance(statement, dict) or any(statement.get(field) != value for field, value in signed.items()):
         raise Refused(f"The record of '{name}' does not say what its signature is for.", _SERVED_WRONG)
-    if release.name != name or release.digest != _digest(release.files):
+    if release.digest != digest_of(release):
         raise Refused(f"The record of '{name}' contradicts itself.", _SERVED_WRONG)
-    if version_order(selector) and release.version != selector:
-        raise Refused(f"The server has {release.version} for '{name}' {selector}.", _SERVED_WRONG)
 
 
 def check_manifest(content: bytes, release: Release) -> None:
@@ -140,15 +130,14 @@ def check_manifest(content: bytes, release: Release) -> None:
         )
 
 
-def _digest(files: Mapping[str, FileRef]) -> str:
-    hashes = {name: file.sha256 for name, file in files.items()}
+def digest_of(release: Release) -> str:
+    """Hex sha256 over the names and hashes of a release's files."""
+    hashes = {name: file.sha256 for name, file in release.files.items()}
     return hashlib.sha256(json.dumps(hashes, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
-def _is_signed(release: Release) -> bool:
+def _parsed(statement: str) -> object:
     try:
-        key, signature = (base64.b64decode(text, validate=True) for text in (release.public_key, release.signature))
-        json.loads(release.statement)
-        return is_signed(key, release.statement.encode(), signature)
+        return json.loads(statement)
     except (ValueError, RecursionError):
-        return False
+        return None

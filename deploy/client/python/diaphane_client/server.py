@@ -1,4 +1,7 @@
-"""What is asked of the server: a version's record, and files by hash, which go on where they were cut."""
+"""What is asked of the server: what an alias means, a version's record, and files by hash.
+
+Downloads of files go on where they were cut.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,7 @@ import httpx
 from diaphane_client.errors import Denied, NotFound, PullError, Refused, Unavailable
 from diaphane_client.files import file_sha256
 from diaphane_client.manifest import FileRef
+from diaphane_client.pointer import MAX_POINTER_BYTES
 from diaphane_client.release import MAX_RECORD_BYTES
 
 ATTEMPTS = 6
@@ -49,28 +53,21 @@ class Server:
     def __exit__(self, *_: object) -> None:
         self._http.close()
 
-    def record(self, name: str, selector: str, etag: str) -> tuple[bytes, str] | None:
-        """The record of a version and its ETag; None if it is still the one with the given ETag.
+    def pointer(self, name: str, selector: str) -> bytes:
+        """The statement of what an alias or a version means now; no cache on the way is to answer for the server.
 
-        Args:
-            name: Name of the bundle.
-            selector: Version or alias.
-            etag: ETag of an earlier answer, or empty.
+        Raises:
+            PullError: There is no such alias or version, or the server cannot or will not tell.
+        """
+        return self._small(f"/v1/models/{name}/pointers/{selector}", f"'{name}' {selector}", MAX_POINTER_BYTES)
+
+    def record(self, name: str, version: str) -> bytes:
+        """The record of a version.
 
         Raises:
             PullError: There is no such version, or the server cannot or will not tell.
         """
-        headers = {"If-None-Match": etag} if etag else {}
-        with _reported(), self._http.stream("GET", f"/v1/models/{name}/versions/{selector}", headers=headers) as answer:
-            if answer.status_code == httpx.codes.NOT_MODIFIED and etag:
-                return None
-            _check_status(answer, f"'{name}' {selector}")
-            content = b""
-            for chunk in answer.iter_raw():
-                content += chunk
-                if len(content) > MAX_RECORD_BYTES:
-                    raise Refused("The server's record of the version is too long.", "Check the URL.")
-            return content, answer.headers.get("ETag", "")
+        return self._small(f"/v1/models/{name}/versions/{version}", f"'{name}' {version}", MAX_RECORD_BYTES)
 
     def download(self, file: FileRef, part: Path) -> None:
         """Downloads a file by its hash.
@@ -98,6 +95,16 @@ class Server:
             f"The server's bytes for {file.sha256} do not have that hash.",
             "Try again; if it stays so, the server or the way to it is damaged or tampered with.",
         )
+
+    def _small(self, path: str, what: str, limit: int) -> bytes:
+        with _reported(), self._http.stream("GET", path, headers={"Cache-Control": "no-cache"}) as answer:
+            _check_status(answer, what)
+            content = b""
+            for chunk in answer.iter_raw():
+                content += chunk
+                if len(content) > limit:
+                    raise Refused(f"The server's answer about {what} is too long.", "Check the URL.")
+            return content
 
     def _complete(self, file: FileRef, part: Path) -> None:
         """Appends to a part until it has its size; attempts that add nothing are counted."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import random
+import re
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,8 @@ from typing import Final
 
 from diaphane_client.errors import PullError
 from diaphane_client.pulling import update
+
+_MOMENT: Final = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC")
 
 SPREAD: Final = 0.1
 """Waits are longer or shorter by up to this share, so that renderers that started together do not ask together."""
@@ -27,7 +30,6 @@ def watch(
     key: str | None,
     folder: str | os.PathLike[str],
     public_key: str | None = None,
-    allow_rollback: bool = False,
     timeout: float = 30.0,
     every: float = 30.0,
     stop: threading.Event | None = None,
@@ -35,8 +37,7 @@ def watch(
     """The bundle that an alias means: at once as `pull` gives it, then whenever it is another one.
 
     Whatever goes wrong later is logged, once each time that it changes, and the bundle stays: the iteration ends when
-    `stop` is set, or its user leaves it. A question about a version that is the same costs the server one answer
-    without a body.
+    `stop` is set, or its user leaves it. A question about a version that is the same costs the server one small answer.
 
     Args:
         name: See `pull`, as for all that is not below.
@@ -44,8 +45,7 @@ def watch(
         url: Where the server is.
         key: API key.
         folder: Where fetched bundles are kept.
-        public_key: The key that versions must be signed with.
-        allow_rollback: Whether lower versions are taken: then a rollback on the server is followed.
+        public_key: The server's key.
         timeout: Seconds without a byte after which a connection is given up.
         every: Seconds between two questions, > 0; a tenth more or less, by chance.
         stop: Ends the iteration when it is set, at the latest when the question under way is answered.
@@ -73,16 +73,17 @@ def watch(
                 key=key,
                 folder=folder,
                 public_key=public_key,
-                allow_rollback=allow_rollback,
                 timeout=timeout,
             )
         except (PullError, OSError) as error:
             if bundle is None:
                 raise
             found, trouble = bundle, error
-        if trouble and str(trouble) != said:
+        # Times in it go on, where a clock is wrong at every question: that is no news.
+        matter = _MOMENT.sub("", str(trouble or ""))
+        if trouble and matter != said:
             log.warning("'%s' %s stays as it is, %s: %s", name, alias, found.name, trouble)
-        said = str(trouble or "")
+        said = matter
         if found != bundle:
             bundle = found
             yield found

@@ -1,7 +1,7 @@
 // Writes src/api.ts: the types of docs/openapi.json that the page uses, and those that they need.
 import { readFileSync, writeFileSync } from "node:fs";
 
-const WANTED = ["ModelPage", "ProblemDocument", "VersionRecord"];
+const WANTED = ["ModelPage", "PointerRecord", "ProblemDocument", "VersionRecord"];
 const here = new URL(".", import.meta.url);
 const { schemas } = JSON.parse(readFileSync(new URL("../../../../docs/openapi.json", here), "utf8")).components;
 

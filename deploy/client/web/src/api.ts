@@ -5,6 +5,14 @@ export interface ModelPage {
   readonly items: readonly (ModelRecord)[];
 }
 
+/** What an alias means now, for clients to believe until it expires. */
+export interface PointerRecord {
+  readonly handovers?: readonly (HandoverRecord)[];
+  readonly public_key: string;
+  readonly signature: string;
+  readonly statement: string;
+}
+
 /** `application/problem+json` (RFC 9457). */
 export interface ProblemDocument {
   readonly detail?: string;
@@ -41,6 +49,12 @@ export interface ModelRecord {
   readonly latest: string;
   readonly name: string;
   readonly versions: number;
+}
+
+/** A signing key names the one that follows it. */
+export interface HandoverRecord {
+  readonly signature: string;
+  readonly statement: string;
 }
 
 /** A file by content. */

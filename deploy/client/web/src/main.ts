@@ -41,7 +41,6 @@ function memory(): Memory {
     return {
       getItem: (name) => kept.get(name) ?? null,
       setItem: (name, value) => void kept.set(name, value),
-      removeItem: (name) => void kept.delete(name),
     };
   }
 }
@@ -91,8 +90,8 @@ function listen(stage: Stage): void {
     changed(side, () => choose(stage, side, select(side).value as Technique));
   at("controls").addEventListener("submit", (event) => event.preventDefault());
   at("forget").addEventListener("click", () => {
-    const [name, selector] = chosenModel();
-    if (name && selector) registry.forget(name, selector);
+    const [name] = chosenModel();
+    if (name) registry.forget(name);
     void loadModel(stage);
   });
   // Anywhere on the page: beside the picture a browser would leave the page for the file.

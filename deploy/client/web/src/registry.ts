@@ -1,10 +1,12 @@
 // Published bundles, from the registry of the server that this page comes from: asked with the dashboard's session,
-// verified, and never an older one than was seen before.
+// verified, and never by an older statement of what an alias means than was seen before.
 
 import type { ModelPage, ProblemDocument } from "./api";
 import type { Bundle } from "./bundle";
 import { MANIFEST, NETWORK, object, parseManifest } from "./manifest";
-import { type Release, isLower, parseRelease, sha256, verify } from "./release";
+import { parsePointer } from "./pointer";
+import { type Release, parseRelease, sha256, verify } from "./release";
+import { NOTHING, type Trust, advance, dumpTrust, forget, parseTrust } from "./trust";
 import { Trouble } from "./trouble";
 
 /** Where the registry answers to a session. */
@@ -13,21 +15,15 @@ export const REGISTRY = "/demo/v1";
 /** Says whether this browser has a session. */
 export const SESSION = "/demo/session";
 
-const KEY = "diaphane key";
+const TRUST = "diaphane trust";
 const NAME = /^[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?$/;
 const SELECTOR = /^[a-z0-9](?:[a-z0-9.-]{0,38}[a-z0-9])?$/;
 
-/** What is remembered between visits: the trusted key, and per alias the last record with its ETag. */
-export type Memory = Pick<Storage, "getItem" | "setItem" | "removeItem">;
-
-interface Seen {
-  readonly etag: string;
-  readonly record: string;
-}
+/** What is remembered between visits: what was seen of the server and its models. */
+export type Memory = Pick<Storage, "getItem" | "setItem">;
 
 /** What the server said, all of it. */
 interface Answer {
-  readonly status: number;
   readonly headers: Headers;
   readonly content: ArrayBuffer;
 }
@@ -50,10 +46,12 @@ export class Registry {
   /**
    * @param memory Of this browser.
    * @param ask `fetch`.
+   * @param now Of this machine's clock, seconds since 1970.
    */
   constructor(
     private readonly memory: Memory,
     private readonly ask: typeof fetch = (...args) => fetch(...args),
+    private readonly now: () => number = () => Date.now() / 1000,
   ) {}
 
   /** All aliases of all models, champions first. */
@@ -80,53 +78,36 @@ export class Registry {
   /**
    * Fetches a bundle and verifies it.
    *
-   * @throws Trouble A hash, a signature, a key, a version or the manifest is not what it must be.
+   * @throws Trouble A hash, a signature, a key, a time, a version or the manifest is not what it must be.
    */
   async pull(name: string, selector: string): Promise<Bundle> {
     if (!NAME.test(name) || !SELECTOR.test(selector)) {
       throw new Trouble(`There can be no '${name}' ${selector}.`, "Choose a model of the list.");
     }
-    const trusted = this.memory.getItem(KEY);
-    const place = `diaphane ${name}@${selector}`;
-    const before = await this.#seen(place, name, selector, trusted);
-    const { etag, record } = await this.#record(name, selector, before?.seen ?? null);
-    const release = parseRelease(record);
-    const isSigned = await verify(release, name, selector, trusted);
-    if (before) checkOrder(release, before.release, selector);
-    const bundle = { ...(await this.#bundle(release)), isSigned };
-    // Remembered once all of it is right.
-    if (isSigned) this.memory.setItem(KEY, release.public_key);
-    this.memory.setItem(place, JSON.stringify({ etag, record }));
-    return bundle;
+    const pointed = await this.#asked(`${REGISTRY}/models/${name}/pointers/${selector}`);
+    const { pointer, isSigned } = await parsePointer(pointed);
+    // Read, judged and kept at once: another page of this browser may do the same.
+    const trust = advance(parseTrust(this.memory.getItem(TRUST)), name, selector, pointer, this.now());
+    if (isSigned) this.memory.setItem(TRUST, dumpTrust(trust));
+    const release = parseRelease(await this.#asked(`${REGISTRY}/models/${name}/versions/${pointer.version}`));
+    await verify(release, pointer);
+    return { ...(await this.#bundle(release)), isSigned };
   }
 
-  /** Forgets the trusted key, and which versions were seen of a model. */
-  forget(name: string, selector: string): void {
-    this.memory.removeItem(KEY);
-    this.memory.removeItem(`diaphane ${name}@${selector}`);
-  }
-
-  async #seen(
-    place: string,
-    name: string,
-    selector: string,
-    trusted: string | null,
-  ): Promise<{ seen: Seen; release: Release } | null> {
+  /** Forgets the trusted key, and what was seen of a model; all, where that cannot be read. */
+  forget(name: string): void {
+    let trust: Trust;
     try {
-      const seen = JSON.parse(this.memory.getItem(place) ?? "null") as Seen;
-      const release = parseRelease(seen.record);
-      await verify(release, name, selector, trusted);
-      return { seen, release };
+      trust = forget(parseTrust(this.memory.getItem(TRUST)), name);
     } catch {
-      return null; // nothing, or not written here
+      trust = NOTHING;
     }
+    this.memory.setItem(TRUST, dumpTrust(trust));
   }
 
-  async #record(name: string, selector: string, seen: Seen | null): Promise<Seen> {
-    const headers: Record<string, string> = seen ? { "If-None-Match": seen.etag } : {};
-    const answer = await this.#get(`${REGISTRY}/models/${name}/versions/${selector}`, { headers, cache: "no-store" });
-    if (answer.status === 304 && seen) return seen;
-    return { etag: answer.headers.get("etag") ?? "", record: text(answer.content) };
+  /** What the server answers now, and no memory in between. */
+  async #asked(address: string): Promise<string> {
+    return text((await this.#get(address, { cache: "no-store" })).content);
   }
 
   async #bundle(release: Release): Promise<Omit<Bundle, "isSigned">> {
@@ -177,7 +158,7 @@ export class Registry {
       throw new Trouble("The server cannot be reached.", "Check the connection, then try again.");
     }
     const { ok, status, headers } = answer;
-    if (ok || status === 304) return { status, headers, content };
+    if (ok) return { headers, content };
     if (status === 401) throw new SignedOut();
     const problem = problemOf(content);
     throw new Trouble(
@@ -202,21 +183,6 @@ function problemOf(content: ArrayBuffer): Partial<ProblemDocument> {
     return object(JSON.parse(text(content)));
   } catch {
     return {};
-  }
-}
-
-function checkOrder(release: Release, before: Release, selector: string): void {
-  if (isLower(release.version, before.version)) {
-    throw new Trouble(
-      `The server has ${release.version} for '${release.name}' ${selector}, which was ${before.version} before.`,
-      "If it was rolled back on purpose, forget what was seen below.",
-    );
-  }
-  if (release.version === before.version && release.digest !== before.digest) {
-    throw new Trouble(
-      `'${release.name}' ${release.version} has other files than it had before.`,
-      "Versions never change: ask who runs the server.",
-    );
   }
 }
 

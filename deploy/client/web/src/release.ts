@@ -1,9 +1,12 @@
 // A published version as the server describes it, believed only as far as its signature goes.
 //
+// - it is the version that the pointer names, with that digest, and signed with the same key;
 // - the statement is the exact text that is signed; what the record says beside it must be the same;
 // - the digest follows from the names and hashes of the files.
 
 import type { FileRef, VersionRecord } from "./api";
+import type { Pointer } from "./pointer";
+import { isSigned } from "./signatures";
 import { Trouble } from "./trouble";
 import { MANIFEST, object, parseFiles } from "./manifest";
 
@@ -46,50 +49,41 @@ export function versionOrder(version: string): number[] {
   return found ? found.slice(1).map(Number) : [];
 }
 
-/** Whether one version is lower than another. */
-export function isLower(one: string, other: string): boolean {
-  const [a, b] = [versionOrder(one), versionOrder(other)];
-  const at = [0, 1, 2].find((i) => a[i] !== b[i]);
-  return at !== undefined && (a[at] ?? -1) < (b[at] ?? -1);
-}
-
 /**
- * Checks that a release is what was asked for, and signed with the trusted key.
+ * Checks that a release is what a pointer names, and that its signature holds as far as the browser can tell.
  *
- * @param trusted Public key, base64; null: none is known yet, and the release's own is taken.
- * @returns Whether the signature could be checked: a browser may not know Ed25519.
  * @throws Trouble It is not what it must be.
  */
-export async function verify(
-  release: Release,
-  name: string,
-  selector: string,
-  trusted: string | null,
-): Promise<boolean> {
-  if (trusted !== null && release.public_key !== trusted) {
+export async function verify(release: Release, pointer: Pointer): Promise<void> {
+  const { name, version, digest } = pointer;
+  if (release.name !== name || release.version !== version || release.digest !== digest) {
     throw new Trouble(
-      `'${name}' is signed with another key than this browser trusts.`,
-      "If the server's key was changed on purpose, forget the trusted key below.",
+      `The server sent '${release.name}' ${release.version}, and states that '${name}' ${pointer.selector} is ` +
+        `${version} with other files.`,
+      SERVED_WRONG,
     );
   }
-  const signed = await isSigned(release);
-  if (signed === false) throw new Trouble(`The signature of '${name}' ${release.version} is wrong.`, SERVED_WRONG);
+  if (release.public_key !== pointer.keys.at(-1)) {
+    throw new Trouble(
+      `'${name}' ${version} is signed with another key than the statement that names it.`,
+      "If the server's key was changed a moment ago, try again; else ask who runs it.",
+    );
+  }
+  if ((await isSigned(release.public_key, release.statement, release.signature)) === false) {
+    throw new Trouble(`The signature of '${name}' ${version} is wrong.`, SERVED_WRONG);
+  }
   let statement: Record<string, unknown>;
   try {
     statement = object(JSON.parse(release.statement));
   } catch {
     throw new Trouble(`The statement of '${name}' cannot be read.`, SERVED_WRONG);
   }
-  const said = { format: STATEMENT, name, version: release.version, digest: release.digest, files: release.files };
+  const said = { format: STATEMENT, name, version, digest, files: release.files };
   const differs = Object.entries(said).some(([member, value]) => canonical(statement[member]) !== canonical(value));
   if (differs) throw new Trouble(`The record of '${name}' does not say what its signature is for.`, SERVED_WRONG);
-  if (release.name !== name || release.digest !== (await digestOf(release.files))) {
+  if (digest !== (await digestOf(release.files))) {
     throw new Trouble(`The record of '${name}' contradicts itself.`, SERVED_WRONG);
   }
-  if (versionOrder(selector).length && release.version !== selector) {
-    throw new Trouble(`The server has ${release.version} for '${name}' ${selector}.`, SERVED_WRONG);
-  }
-  return signed !== null;
 }
 
 /** Hex sha256 of bytes. */
@@ -101,29 +95,6 @@ export async function sha256(content: BufferSource): Promise<string> {
 async function digestOf(files: Readonly<Record<string, FileRef>>): Promise<string> {
   const hashes = Object.fromEntries(Object.entries(files).map(([name, file]) => [name, file.sha256]));
   return sha256(new TextEncoder().encode(canonical(hashes)));
-}
-
-/** Whether the signature is right; null where the browser cannot tell. */
-async function isSigned(release: Release): Promise<boolean | null> {
-  let key: CryptoKey;
-  const bytes = decoded(release.public_key);
-  const signature = decoded(release.signature);
-  if (bytes?.length !== 32 || signature?.length !== 64) return false;
-  try {
-    key = await crypto.subtle.importKey("raw", bytes, { name: "Ed25519" }, false, ["verify"]);
-  } catch (error) {
-    if (error instanceof DOMException && error.name === "NotSupportedError") return null;
-    return false;
-  }
-  return crypto.subtle.verify({ name: "Ed25519" }, key, signature, new TextEncoder().encode(release.statement));
-}
-
-function decoded(base64: string): Uint8Array<ArrayBuffer> | null {
-  try {
-    return Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
-  } catch {
-    return null;
-  }
 }
 
 /** JSON with members in the order of their names and no space, as the service signs it. */

@@ -33,26 +33,49 @@ export class Memory {
   readonly kept = new Map<string, string>();
   getItem = (key: string): string | null => this.kept.get(key) ?? null;
   setItem = (key: string, value: string): void => void this.kept.set(key, value);
-  removeItem = (key: string): void => void this.kept.delete(key);
+}
+
+/** A key that signs, or stops to. */
+export class Key {
+  private constructor(
+    private readonly pair: webcrypto.CryptoKeyPair,
+    readonly publicKey: string,
+  ) {}
+
+  static async make(): Promise<Key> {
+    const pair = (await webcrypto.subtle.generateKey("Ed25519", true, ["sign", "verify"])) as webcrypto.CryptoKeyPair;
+    return new Key(pair, base64(await webcrypto.subtle.exportKey("raw", pair.publicKey)));
+  }
+
+  async sign(text: string): Promise<string> {
+    return base64(await webcrypto.subtle.sign("Ed25519", this.pair.privateKey, bytes(text)));
+  }
+
+  /** Names the key that follows this one. */
+  async handOver(to: Key): Promise<Json> {
+    const statement = canonical({ format: "diaphane-handover/1", from: this.publicKey, to: to.publicKey, issued: 1 });
+    return { statement, signature: await this.sign(statement) };
+  }
 }
 
 /** A service that has published versions of `glass`, and what was asked of it. */
 export class Service {
   readonly asked: string[] = [];
   readonly blobs = new Map<string, Uint8Array<ArrayBuffer>>();
+  /** Of the version that was published last. */
   record: Json = {};
+  /** Selector -> what it means. */
+  readonly pointers = new Map<string, Json>();
   status = 200;
   isSignedIn = true;
-  #key: webcrypto.CryptoKeyPair | null = null;
+  /** Seconds since 1970. */
+  time = 1_780_000_000;
+  handovers: Json[] = [];
+  #key: Key | null = null;
+  #moves = 0;
 
-  /** Publishes a version with a key of its own, or that of the last one. */
-  async publish(
-    version: string,
-    { content = "fn", newKey = false, edit = (manifest: Json): void => void manifest } = {},
-  ) {
-    if (!this.#key || newKey) {
-      this.#key = (await webcrypto.subtle.generateKey("Ed25519", true, ["sign", "verify"])) as webcrypto.CryptoKeyPair;
-    }
+  /** Publishes a version, and moves the champion to it. */
+  async publish(version: string, { content = "fn", edit = (manifest: Json): void => void manifest } = {}) {
     const files: Record<string, { sha256: string; bytes: number }> = {};
     for (const name of ["predict.wgsl", "weights.safetensors"]) files[name] = await this.#blob(`${content} of ${name}`);
     const manifest = manifestOf({ ...files });
@@ -60,32 +83,51 @@ export class Service {
     files["manifest.json"] = await this.#blob(JSON.stringify(manifest));
     const names = Object.keys(files).sort();
     const digest = await sha256(bytes(JSON.stringify(Object.fromEntries(names.map((n) => [n, files[n]!.sha256])))));
-    const said = {
-      created: "2026-01-01T00:00:00Z",
-      digest,
-      files,
-      format: "diaphane-release/1",
-      name: "glass",
-      version,
-    };
-    const statement = JSON.stringify(said);
-    const signature = base64(await webcrypto.subtle.sign("Ed25519", this.#key.privateKey, bytes(statement)));
-    const public_key = base64(await webcrypto.subtle.exportKey("raw", this.#key.publicKey));
-    this.record = { name: "glass", version, digest, files, statement, signature, public_key };
+    const created = "2026-01-01T00:00:00Z";
+    const statement = canonical({ created, digest, files, format: "diaphane-release/1", name: "glass", version });
+    const key = await this.key();
+    const signature = await key.sign(statement);
+    this.record = { name: "glass", version, digest, files, statement, signature, public_key: key.publicKey };
+    await this.move();
+  }
+
+  /** States that an alias moved to a version just now; `said` may be other than it should be. */
+  async move(selector = "champion", said: Json = {}): Promise<Json> {
+    const { version, digest } = this.record;
+    const times = { issued: this.time, expires: this.time + 900 };
+    const meant = { name: "glass", selector, version, digest, serial: ++this.#moves, ...times };
+    const statement = canonical({ format: "diaphane-pointer/1", ...meant, ...said });
+    const key = await this.key();
+    const signature = await key.sign(statement);
+    const pointer = { statement, signature, public_key: key.publicKey, handovers: this.handovers };
+    this.pointers.set(selector, pointer);
+    return pointer;
+  }
+
+  /** The key that signs. */
+  async key(): Promise<Key> {
+    return (this.#key ??= await Key.make());
+  }
+
+  /** Signs with another key from now on; whether the old one hands over to it. */
+  async changeKey(key: Key, isHandedOver: boolean): Promise<void> {
+    this.handovers = isHandedOver ? [...this.handovers, await (await this.key()).handOver(key)] : [];
+    this.#key = key;
   }
 
   readonly fetch = async (address: RequestInfo | URL, options: RequestInit = {}): Promise<Response> => {
     const path = String(address);
     this.asked.push(path);
+    if (this.status === 304) return new Response(null, { status: 304 });
     if (this.status !== 200) return new Response('{"title":"No."}', { status: this.status });
     if (path === "/demo/session") return new Response(JSON.stringify({ signed_in: this.isSignedIn }));
     if (path.startsWith("/demo/v1/blobs/sha256/")) {
       const blob = this.blobs.get(path.split("/").at(-1)!);
       return blob ? new Response(blob) : new Response('{"detail":"There is no such file."}', { status: 404 });
     }
-    const etag = `"${await sha256(bytes(JSON.stringify(this.record)))}"`;
-    if (new Headers(options.headers).get("if-none-match") === etag) return new Response(null, { status: 304 });
-    return new Response(JSON.stringify(this.record), { headers: { etag } });
+    if (options.cache !== "no-store") throw new Error("an answer may be an old one");
+    const selector = path.split("/").at(-1)!;
+    return new Response(JSON.stringify(path.includes("/pointers/") ? this.pointers.get(selector) : this.record));
   };
 
   /** Another content under the hash of a file. */
@@ -101,3 +143,7 @@ export class Service {
     return { sha256: hash, bytes: content.byteLength };
   }
 }
+
+/** JSON as the service signs it, of members that are no objects but for the files. */
+const canonical = (said: Json): string =>
+  JSON.stringify(Object.fromEntries(Object.entries(said).sort(([a], [b]) => (a < b ? -1 : 1))));

@@ -1,7 +1,13 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from typing import Any
 
 import httpx
@@ -9,6 +15,8 @@ import pytest
 from support.api import Api
 
 from schemas.limits import LIMITS
+from services.api import body as body_module
+from services.api import uploads as uploads_module
 
 DATA = bytes(range(100))
 HASH = hashlib.sha256(DATA).hexdigest()
@@ -145,3 +153,99 @@ def test_uploads_that_are_refused(api: Api) -> None:
     assert api.request("PATCH", path, content=b"x", headers=octets).status_code == 422
     assert api.request("DELETE", path, "submit").status_code == 204
     assert api.get(path).status_code == 404
+
+
+OCTETS = {"Content-Type": "application/octet-stream", "Upload-Offset": "0"}
+
+
+def _begin(api: Api, scope: str, sha256: str = "1" * 64) -> str:
+    return str(api.post("/v1/uploads", scope, json={"sha256": sha256, "bytes": 100 << 20}).json()["id"])
+
+
+@contextmanager
+def _waiting(url: str, api: Api, path: str, scope: str, announced: int = LIMITS.part_bytes) -> Iterator[socket.socket]:
+    """A part of which one byte came."""
+    host, _, port = url.removeprefix("http://").partition(":")
+    lines = [f"PATCH {path} HTTP/1.1", "Host: localhost", f"Content-Length: {announced}"]
+    lines += [f"{name}: {value}" for name, value in (OCTETS | api.headers(scope)).items()]
+    with socket.create_connection((host, int(port)), timeout=20.0) as connection:
+        connection.sendall("\r\n".join([*lines, "", "x"]).encode())
+        yield connection
+
+
+def test_parts_that_wait_leave_room_for_other_keys(api: Api) -> None:
+    path = f"/v1/uploads/{_begin(api, 'submit')}"
+    other = _begin(api, "admin", HASH)
+    with api.served() as url, ExitStack() as waiting:
+        connections = [waiting.enter_context(_waiting(url, api, path, "submit")) for _ in range(16)]
+        time.sleep(1.0)
+        answer = httpx.patch(
+            f"{url}/v1/uploads/{other}", content=DATA, headers=OCTETS | api.headers("admin"), timeout=20.0
+        )
+        assert (answer.status_code, answer.json()["received"]) == (200, 100)
+        refused = 0
+        for connection in connections:
+            connection.setblocking(False)
+            with suppress(BlockingIOError):
+                refused += connection.recv(1 << 16).startswith(b"HTTP/1.1 503")
+        assert refused == 12  # one key has a quarter
+
+
+def test_what_names_no_upload_takes_no_room(api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(uploads_module, "_parts", uploads_module._Memory(0, 0))
+    part = {"content": b"x", "headers": OCTETS}
+    assert api.request("PATCH", f"/v1/uploads/upl_{'0' * 24}", "submit", **part).status_code == 404
+    own = _begin(api, "submit")
+    refused = api.request("PATCH", f"/v1/uploads/{own}", "submit", **part)
+    assert (refused.status_code, refused.headers["retry-after"]) == (503, "2")
+
+
+@pytest.fixture
+def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(body_module, "LIMITS", replace(LIMITS, body_stall_seconds=0.5, body_rate=1000))
+
+
+def _status(connection: socket.socket) -> tuple[int, str]:
+    answer = b""
+    while piece := connection.recv(1 << 16):
+        answer += piece
+    head, _, body = answer.partition(b"\r\n\r\n")
+    return int(head.split()[1]), json.loads(body)["type"]
+
+
+@pytest.mark.usefixtures("hasty")
+@pytest.mark.parametrize("announced", [LIMITS.part_bytes, 10])
+def test_a_body_that_stops_is_given_up(api: Api, announced: int) -> None:
+    path = f"/v1/uploads/{_begin(api, 'submit')}"
+    with api.served() as url, _waiting(url, api, path, "submit", announced) as connection:
+        begun = time.monotonic()
+        assert _status(connection) == (408, "/v1/problems/too-slow")
+        assert time.monotonic() - begun < 10.0
+
+
+@pytest.mark.usefixtures("hasty")
+def test_a_body_that_trickles_in_is_given_up(api: Api) -> None:
+    """Each byte comes in time, and all of them would take a year."""
+    path = f"/v1/uploads/{_begin(api, 'submit')}"
+    with api.served() as url, _waiting(url, api, path, "submit") as connection:
+        begun = time.monotonic()
+        with suppress(OSError):
+            while time.monotonic() - begun < 8.0:
+                connection.sendall(b"x")
+                time.sleep(0.1)
+        assert time.monotonic() - begun < 6.0
+
+
+@pytest.mark.usefixtures("hasty")
+def test_a_slow_body_within_the_rate_is_taken(api: Api) -> None:
+    upload = _begin(api, "submit")
+
+    def body() -> Iterator[bytes]:
+        for _ in range(6):
+            yield b"x" * 1000
+            time.sleep(0.2)
+
+    with api.served() as url:
+        headers = OCTETS | api.headers("submit")
+        answer = httpx.patch(f"{url}/v1/uploads/{upload}", content=body(), headers=headers, timeout=20.0)
+    assert (answer.status_code, answer.json()["received"]) == (200, 6000)

@@ -141,12 +141,6 @@ def test_a_server_that_stops_ends_its_streams(api: Api) -> None:
     assert ended.wait(5.0)
 
 
-def test_too_many_listeners_are_refused(api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("services.api.jobs.LISTENERS", 0)
-    answer = api.get(f"/v1/jobs/{api.job()}/events", headers=STREAM)
-    assert (answer.status_code, answer.json()["type"]) == (503, "/v1/problems/unavailable")
-
-
 async def _collect(feeds: module.Feeds, job: str, after: int = 0) -> list[str]:
     state = feeds.state(job)
     assert state is not None

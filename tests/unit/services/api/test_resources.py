@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ from support.api import HASH, Api, build_spec, measurement, shard
 from support.postgres import Postgres
 
 from services.database import tables
+from services.registry.signing import verify
 from services.store import Address
 
 
@@ -182,6 +184,26 @@ def test_aliases_move_and_come_back_with_their_history(full: Api) -> None:
     assert full.get("/v1/models/none/aliases").status_code == 404
     unknown = full.request("PUT", path, "publish", json={"version": "9.9.9", "reason": "x"})
     assert unknown.status_code == 404
+
+
+def test_what_an_alias_means_is_stated_anew_at_every_question(full: Api) -> None:
+    alias, path = "/v1/models/glass/aliases/champion", "/v1/models/glass/pointers/champion"
+    assert full.get(path).status_code == 404
+    assert full.request("PUT", alias, "publish", json={"version": "1.1.0", "reason": "first"}).status_code == 200
+    for headers in ({}, {"If-None-Match": "*"}, {"If-Modified-Since": "Fri, 01 Jan 2100 00:00:00 GMT"}):
+        answer = full.get(path, headers=headers)
+        assert (answer.status_code, answer.headers["cache-control"]) == (200, "no-store")
+        assert "etag" not in answer.headers
+    record = answer.json()
+    statement = json.loads(record["statement"])
+    assert (statement["selector"], statement["version"]) == ("champion", "1.1.0")
+    assert verify(record["public_key"], record["statement"], record["signature"])
+    assert [record["public_key"]] == full.get("/v1/signing-keys").json()["keys"]
+    assert json.loads(full.get("/v1/models/glass/pointers/1.0.0").json()["statement"])["serial"] == 0
+    back = full.post(f"{alias}/rollback", "publish", json={"reason": "there is none"})
+    assert back.status_code == 409
+    assert full.request("PUT", alias, "publish", json={"version": "1.0.0", "reason": "older"}).status_code == 200
+    assert json.loads(full.get(path).json()["statement"])["serial"] > statement["serial"]
 
 
 def test_a_version_s_etag_changes_with_what_its_record_says(full: Api) -> None:

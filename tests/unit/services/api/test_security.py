@@ -3,9 +3,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import httpx
 import pytest
 from fastapi import APIRouter
 from support.api import Api
+from support.dashboard import Visitor
 
 from schemas.service import SCOPES
 from services.api import application, routes
@@ -121,10 +123,65 @@ def test_a_key_may_ask_only_so_often(tmp_path: Path) -> None:
     assert api.get("/v1/jobs", "submit").status_code == 200
 
 
-def test_an_address_may_be_wrong_only_so_often_and_known_keys_are_still_heard(tmp_path: Path) -> None:
+GUESS = f"dia_000000000000_{'a' * 43}"
+"""Of the form of a secret, and nobody's."""
+
+
+def _wrong(api: Api, secret: str, times: int) -> list[int]:
+    headers = {"Authorization": f"Bearer {secret}"}
+    return [api.get("/v1/jobs", None, headers=headers).status_code for _ in range(times)]
+
+
+def test_an_address_may_guess_only_so_often(tmp_path: Path) -> None:
+    assert _wrong(Api(tmp_path, rate=0.001, burst=8), GUESS, 4) == [401, 401, 429, 429]
+
+
+def test_a_flood_of_wrong_keys_stops_nobody_at_the_same_address_who_is_right(tmp_path: Path) -> None:
+    api = Api(tmp_path, rate=0.001, burst=20)
+    signed_in = Visitor(api, "read")
+    known = api.secrets["submit"]
+    assert api.get("/v1/jobs", "submit").status_code == 200
+    assert _wrong(api, f"{known[:17]}{'a' * 43}", 30)[-1] == 429
+    assert _wrong(api, GUESS, 3) == [429] * 3
+    assert api.get("/v1/jobs", "submit").status_code == 200
+    assert api.get("/v1/jobs", "read").status_code == 200  # not heard of before
+    assert signed_in.get("/jobs").status_code == 200
+    assert Visitor(api, "publish").get("/jobs").status_code == 200  # a new session
+    again = Api(tmp_path, rate=0.001, burst=20)
+    again.secrets = api.secrets
+    assert again.get("/v1/jobs", "publish").status_code == 200  # after a restart
+
+
+def test_what_is_no_secret_or_was_one_is_no_guess(tmp_path: Path) -> None:
+    """A variable that is not set, a key that was revoked on a build server: neither looks for a key."""
     api = Api(tmp_path, rate=0.001, burst=8)
-    assert api.get("/v1/jobs", "read").status_code == 200
-    wrong = [api.get("/v1/jobs", None, headers={"Authorization": f"Bearer {n}"}).status_code for n in range(3)]
-    assert wrong == [401, 401, 429]
-    assert api.get("/v1/jobs", "read").status_code == 200
-    assert api.get("/v1/jobs", "submit").status_code == 429  # not heard of before
+    record, secret = api.service.keys.create("old", ["read"])
+    api.service.keys.revoke(record.id)
+    for wrong in ("$DIAPHANE_KEY", secret):
+        assert _wrong(api, wrong, 6) == [401] * 6
+
+
+def test_who_asks_is_what_the_connection_says(tmp_path: Path) -> None:
+    """`X-Forwarded-For` costs nothing to write: with another address each time nobody would ever be counted."""
+    api = Api(tmp_path, rate=0.001, burst=8)
+    with api.served() as url, httpx.Client() as client:
+        statuses = [
+            client.get(
+                f"{url}/v1/jobs", headers={"Authorization": f"Bearer {GUESS}", "X-Forwarded-For": f"203.0.113.{n}"}
+            ).status_code
+            for n in range(4)
+        ]
+    assert statuses == [401, 401, 429, 429]
+
+
+def test_a_proxy_that_was_named_is_believed(tmp_path: Path) -> None:
+    api = Api(tmp_path, rate=0.001, burst=8)
+    with api.served(proxies=("127.0.0.0/8",)) as url, httpx.Client() as client:
+        statuses = [
+            client.get(
+                f"{url}/v1/jobs",
+                headers={"Authorization": f"Bearer {GUESS}", "X-Forwarded-For": f"198.51.100.{n}, 203.0.113.7"},
+            ).status_code
+            for n in range(4)
+        ]
+    assert statuses == [401, 401, 429, 429]  # what the proxy itself wrote counts, not what it was sent

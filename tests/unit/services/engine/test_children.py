@@ -27,10 +27,8 @@ def child(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Child]:
         make="support.bodies:make",
         inspect="support.bodies:inspect",
         sandbox="",
-        store=tmp_path / "store",
-        read=(),
-        write=(),
         scratch=tmp_path / "work",
+        kernels=tmp_path / "kernels",
     )
     found = Child(options, Spawner(), "render-0")
     yield found
@@ -39,7 +37,7 @@ def child(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Child]:
 
 def _task(folder: Path, **params: object) -> dict[str, object]:
     asked = Task(name="t", stage="render", version="1", params={"trace": str(folder / "trace"), **params})
-    return {"task": asked.model_dump(mode="json"), "folders": {}}
+    return {"task": asked.model_dump(mode="json")}
 
 
 def test_a_child_is_used_again_and_tells_what_it_took(child: Child, tmp_path: Path) -> None:
@@ -52,7 +50,7 @@ def test_a_child_is_used_again_and_tells_what_it_took(child: Child, tmp_path: Pa
     assert 0.0 <= said[0][0] < 1.0
     child.call("t", _task(tmp_path, other=1), 20.0, Hooks())
     assert child.pid == pid
-    assert len(list(Store(tmp_path / "store").artifacts())) == 2
+    assert len(list(Store(child.room.made).artifacts())) == 1, "what the task before it made is gone"
 
 
 def test_what_a_body_raises_comes_back_as_what_it_is(child: Child, tmp_path: Path) -> None:
@@ -64,7 +62,7 @@ def test_what_a_body_raises_comes_back_as_what_it_is(child: Child, tmp_path: Pat
         name="t", stage="render", version="1", needs=("scene/" + "0" * 64,), params={"trace": str(tmp_path / "t")}
     )
     with pytest.raises(MissingArtifact, match="scene/0000"):
-        child.call("t", {"task": missing.model_dump(mode="json"), "folders": {}}, 20.0, Hooks())
+        child.call("t", {"task": missing.model_dump(mode="json")}, 20.0, Hooks())
     with pytest.raises(TaskError, match="ValueError: bad luck"):
         child.call("t", _task(tmp_path, fault="raise"), 20.0, Hooks(line=lines.append))
     assert lines[0].startswith("Traceback")
@@ -98,13 +96,18 @@ def test_a_lost_task_ends_at_once_even_if_it_was_lost_before_it_began(child: Chi
 
 
 def test_a_child_that_is_shut_in_makes_artifacts_and_nothing_else(child: Child, tmp_path: Path) -> None:
-    store = tmp_path / "store"
-    (store / "tmp").mkdir(parents=True)
-    shut = replace(child._options, sandbox="services.sandbox:enter", read=(store, ROOT / "tests"), write=(store,))
+    (tmp_path / "traces").mkdir()
+    shut = replace(
+        child._options,
+        sandbox="services.sandbox:enter",
+        read=(ROOT / "tests",),
+        write=(tmp_path / "traces",),
+    )
     inside = Child(shut, Spawner(), "render-1")
-    inside.call("t", _task(store / "tmp"), 30.0, Hooks())
+    inside.call("t", _task(tmp_path / "traces"), 30.0, Hooks())
+    assert len(list(Store(inside.room.made).artifacts())) == 1
     with pytest.raises(TaskError, match="socket"):
-        inside.call("t", _task(store / "tmp", fault="socket"), 30.0, Hooks())
+        inside.call("t", _task(tmp_path / "traces", fault="socket"), 30.0, Hooks())
     inside.stop()
 
 

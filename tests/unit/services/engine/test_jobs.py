@@ -11,7 +11,7 @@ from support.workers import Fleet
 
 from schemas.problem import ExitCode, Problem
 from services.database import tables
-from services.engine import states, system
+from services.engine import checks, states, system
 from services.store import canonical_json
 
 
@@ -136,12 +136,65 @@ def test_unknown_jobs_are_not_found(fleet: Fleet) -> None:
         assert problem.value.code is ExitCode.NOT_FOUND
 
 
-def test_a_check_of_a_scene_is_queued_once_at_a_time(fleet: Fleet) -> None:
-    for _ in range(2):
-        fleet.jobs.check_scene("scn_1")
-    assert [(queue.role, queue.queued) for queue in fleet.jobs.queues()][1] == ("render", 1)
+def _sent(fleet: Fleet, key: str, *ids: str) -> None:
+    for number, scene_id in enumerate(ids):
+        row = {"id": scene_id, "digest": scene_id, "name": "a", "root": "a.usda", "files": {}, "bytes": 0}
+        row |= {"state": "checking", "created": float(number), "created_by": key}
+        with fleet.database.write() as connection:
+            connection.execute(tables.scenes.insert().values(**row))
+        fleet.jobs.check_next(scene_id)
+
+
+def _queued_checks(fleet: Fleet) -> list[str]:
+    table = system.workflows(fleet.database)
+    found = table.select().where(table.c.queue_name == "check", table.c.status.in_(system.LIVE))
+    with fleet.database.read() as connection:
+        rows = connection.execute(found.order_by(table.c.created_at))
+        return [row.workflow_uuid.removeprefix("check/") for row in rows]
+
+
+def _check_ended(fleet: Fleet, scene_id: str, status: str, state: str) -> None:
     table = system.workflows(fleet.database)
     with fleet.database.write() as connection:
-        connection.execute(table.update().values(status="ERROR"))
-    fleet.jobs.check_scene("scn_1")
-    assert _workflow(fleet, "scn_1/1") == "ENQUEUED"
+        mine = table.c.workflow_uuid.like(f"%/{scene_id}/%")
+        connection.execute(tables.scenes.update().where(tables.scenes.c.id == scene_id).values(state=state))
+        connection.execute(table.update().where(mine).values(status=status))
+    fleet.jobs.check_next(scene_id)
+
+
+def test_a_check_is_queued_once_at_a_time_and_again_when_it_failed(fleet: Fleet) -> None:
+    _sent(fleet, "key_a", "scn_1")
+    fleet.jobs.check_next("scn_1")
+    assert _queued_checks(fleet) == ["key_a/scn_1/0"]
+    assert [(queue.role, queue.queued) for queue in fleet.jobs.queues()][1:] == [
+        *(("render", 0), ("label", 0), ("train", 0)),
+        ("check", 1),
+    ]
+    _check_ended(fleet, "scn_1", "ERROR", "checking")
+    assert _queued_checks(fleet) == ["key_a/scn_1/1"]
+
+
+def test_a_key_with_many_uploads_has_one_in_the_queue_and_another_key_is_next(fleet: Fleet) -> None:
+    _sent(fleet, "key_a", *(f"scn_{number}" for number in range(8)))
+    _sent(fleet, "key_b", "scn_b0", "scn_b1")
+    assert _queued_checks(fleet) == ["key_a/scn_0/0", "key_b/scn_b0/0"]
+    _check_ended(fleet, "scn_0", "SUCCESS", "accepted")
+    assert _queued_checks(fleet) == ["key_b/scn_b0/0", "key_a/scn_1/0"]
+    assert fleet.jobs.queues()[-1].queued == 9
+
+
+def test_the_next_check_is_queued_while_the_workflow_of_the_last_one_still_ends(fleet: Fleet) -> None:
+    _sent(fleet, "key_a", "scn_0", "scn_1")
+    _check_ended(fleet, "scn_0", "PENDING", "rejected")
+    assert _queued_checks(fleet) == ["key_a/scn_0/0", "key_a/scn_1/0"]
+
+
+def test_a_scene_that_takes_its_checkers_with_it_is_rejected_and_the_next_one_is_checked(fleet: Fleet) -> None:
+    _sent(fleet, "key_a", "scn_0", "scn_1")
+    for _ in range(checks.TRIES):
+        _check_ended(fleet, "scn_0", system.LOST, "checking")
+    checks.see_to_adrift(fleet.database, fleet.jobs)
+    with fleet.database.read() as connection:
+        rows = connection.execute(sa.select(tables.scenes.c.id, tables.scenes.c.state)).all()
+    assert {row.id: row.state for row in rows} == {"scn_0": "rejected", "scn_1": "checking"}
+    assert _queued_checks(fleet) == ["key_a/scn_1/0"]

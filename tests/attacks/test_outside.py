@@ -1,0 +1,185 @@
+"""What the processes that meet uploads open, seen from the outside: nothing but their room, and what libraries need."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from attacks import make
+
+from services.sandbox import DEVICES, OWN_PACKAGES, SYSTEM
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+CANARY = "canary"
+PROJECT = (*(str(ROOT / name) for name in OWN_PACKAGES), str(ROOT / "deploy"))
+MACHINE = (*SYSTEM, *DEVICES, "/proc", "/sys", "/etc/locale.alias", "/etc/ssl/openssl.cnf")
+LISTED = {"/dev", str(ROOT), str(ROOT / "tests")}
+"""Folders whose names are read: for devices, and for modules in the entries of PYTHONPATH."""
+"""What the interpreter and libraries read of the machine, before a process is shut in as well."""
+OPENED = re.compile(r"\b(?:open|openat|openat2)\(.*\) = \d+<(?P<path>.*)>$")
+
+TEXTURE = """
+def Material "NAME" {
+    token outputs:surface.connect = </NAME/Surface.outputs:surface>
+    def Shader "Surface" {
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:diffuseColor.connect = </NAME/Reader.outputs:rgb>
+        float inputs:opacity = 0.5
+        token outputs:surface
+    }
+    def Shader "Reader" {
+        uniform token info:id = "UsdUVTexture"
+        asset inputs:file = @PATH@
+        float3 outputs:rgb
+    }
+}
+"""
+SHEET = """
+def Mesh "NAME_sheet" (prepend apiSchemas = ["MaterialBindingAPI"]) {
+    int[] faceVertexCounts = [4]
+    int[] faceVertexIndices = [0, 1, 2, 3]
+    point3f[] points = [(0, 0, Z), (1, 0, Z), (1, 1, Z), (0, 1, Z)]
+    color3f[] primvars:displayColor = [(0.ZZ, 0.5, 0.1)]
+    rel material:binding = <LOOK>
+}
+"""
+MATERIALX = """<?xml version="1.0"?>
+<materialx version="1.38">
+  <image name="picture" type="color3"><input name="file" type="filename" value="canary.png"/></image>
+  <standard_surface name="surface" type="surfaceshader">
+    <input name="base_color" type="color3" nodename="picture"/>
+  </standard_surface>
+  <surfacematerial name="Look" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="surface"/>
+  </surfacematerial>
+</materialx>
+"""
+
+
+def _sheet(name: str, number: int, look: str) -> str:
+    """A square with a material; several of them lie behind each other."""
+    return SHEET.replace("NAME", name).replace("ZZ", str(number)).replace("Z", f"0.{number}").replace("LOOK", look)
+
+
+def _textures(stolen: str) -> dict[str, str]:
+    """Textures that lie where the service was started: named directly, as tiles, in documents, in layers."""
+    named = {"Blob": stolen, "Plain": "canary.png", "Dotted": "./canary.png", "Tiles": "canary.<UDIM>.png"}
+    body = "".join(TEXTURE.replace("NAME", name).replace("PATH", path) for name, path in named.items())
+    looks = [*(f"/{name}" for name in named), "/Below", "/Given/Look"]
+    body += "".join(_sheet(look.split("/")[1], number + 1, look) for number, look in enumerate(looks))
+    body += 'def "Below" (references = @below/look.usda@</Look>) {}\ndef "Given" (references = @own.mtlx@) {}\n'
+    below = TEXTURE.replace("NAME", "Look").replace("PATH", "canary.png")
+    return {"scene.usda": make.usda(body), "below/look.usda": make.usda(below), "own.mtlx": MATERIALX}
+
+
+def _layers() -> dict[str, str]:
+    """An upload whose layers lie where the service was started, by every way to compose one."""
+    active = "double2[] active = [(0, 0)]\ndouble2[] times = [(0, 0), (4, 4)]"
+    sets = {
+        "given": f"asset[] assetPaths = [@canary.usda@]\nasset manifestAssetPath = @canary.usda@\n{active}",
+        "counted": f'string templateAssetPath = "./canary.#.usda"\n{make.TEMPLATE}',
+    }
+    clips = "".join(
+        f'dictionary {name} = {{\n{lines}\nstring primPath = "/Sheet"\n}}\n' for name, lines in sets.items()
+    )
+    body = f'def "Clipped" (\nclips = {{\n{clips}}}\n) {{\ndouble x\n}}\n'
+    for arc in ("references = @canary.usda@", "payload = @canary.usda@", "prepend references = @canary.mtlx@"):
+        body += f'def "Arc{len(body)}" (\n{arc}\n) {{\n}}\n'
+    body += 'def "Named" {\nasset file = @canary.png@\n}\n'
+    return {"scene.usda": make.usda(body + _sheet("Plain", 1, "/None"), "subLayers = [@canary.usda@]")}
+
+
+@dataclass(frozen=True)
+class Audited:
+    """What a service did, and what its children opened."""
+
+    folder: Path
+    done: dict[str, Any]
+    logs: dict[str, list[str]]
+
+
+@pytest.fixture(scope="module")
+def audited(tmp_path_factory: pytest.TempPathFactory) -> Audited:
+    """A service started in a folder of files that nobody may open."""
+    assert shutil.which("strace"), "scripts/setup-tests.sh installs it"
+    folder = tmp_path_factory.mktemp("audited")
+    server = folder / "server"
+    server.mkdir()
+    victim = make.png(3, 5)
+    (folder / "victim.png").write_bytes(victim)
+    digest = hashlib.sha256(victim).hexdigest()
+    for name in ("canary.png", "canary.1001.png"):
+        (server / name).write_bytes(victim)
+    (server / "canary.mtlx").write_text(MATERIALX)
+    for name in ("canary.usda", "canary.0.usda", "canary.1.usda"):
+        (server / name).write_text(make.usda())
+    stolen = f".diaphane/store/blobs/sha256/{digest[:2]}/{digest}"
+    for name, files in {"textures": _textures(stolen), "layers": _layers()}.items():
+        for file, text in files.items():
+            path = folder / "scenes" / name / file
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text)
+    path = os.pathsep.join([str(ROOT), str(ROOT / "tests"), str(ROOT / "deploy/client/python")])
+    environment = {k: v for k, v in os.environ.items() if not k.startswith("DIAPHANE_")} | {"PYTHONPATH": path}
+    # Where USD would look if a child believed its worker's environment.
+    environment["PXR_AR_DEFAULT_SEARCH_PATH"] = str(server)
+    command = [sys.executable, str(HERE / "audit.py"), str(folder)]
+    finished = subprocess.run(command, cwd=server, env=environment, capture_output=True, text=True)
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    logs = {log.name: log.read_text(errors="replace").splitlines() for log in folder.glob("opened.*.log")}
+    return Audited(folder, json.loads((folder / "done.json").read_text()), logs)
+
+
+def test_every_kind_of_process_was_watched(audited: Audited) -> None:
+    assert {scene["state"] for scene in audited.done["scenes"].values()} == {"accepted"}, audited.done["scenes"]
+    assert audited.done["job"]["state"] == "succeeded", audited.done["job"]
+    assert set(audited.done["tasks"].values()) == {"done"}
+    stages = {name.split()[0] for name in audited.done["tasks"]}
+    assert stages == {"scene", "render"}
+    assert len(audited.logs) >= 2 * len(audited.done["scenes"]), "a process for each check, and one for each scene"
+
+
+def test_no_process_opens_anything_outside_of_its_room(audited: Audited) -> None:
+    """Also by name: whatever USD would have found in the folder that the service was started in is not asked for."""
+    python = (sys.prefix, sys.base_prefix, str(Path(sys.executable).resolve().parent), *PROJECT)
+    state = f"{audited.folder}/server/.diaphane"
+    work = (f"{state}/work/", f"{state}/checkpoints/")
+    outside = []
+    for name, lines in audited.logs.items():
+        for line in lines:
+            found = OPENED.search(line)
+            path = found["path"] if found else ""
+            if CANARY in path or (path and path not in LISTED and not path.startswith((*python, *MACHINE, *work))):
+                outside.append(f"{name}: {line}")
+    assert outside == []
+    assert any(work[0] in line for lines in audited.logs.values() for line in lines), "the log has what it should have"
+
+
+def test_no_process_opens_another_one_s_room_or_the_input_of_another_task(audited: Audited) -> None:
+    work = re.compile(rf"{re.escape(str(audited.folder))}/server/\.diaphane/work/\d[^/]+/(?P<room>[^/]+)/")
+    for name, lines in audited.logs.items():
+        rooms = {found["room"] for line in lines if (found := work.search(line)) and "= -1" not in line}
+        sources = {found for line in lines for found in re.findall(r"/sources/([0-9a-f]{64})", line)}
+        assert len(rooms) <= 1, name
+        assert len(sources) <= 1, name
+
+
+def test_check_and_job_agree_on_what_is_missing(audited: Audited) -> None:
+    for name, scene in audited.done["scenes"].items():
+        found = [line for line in scene["facts"]["warnings"] if "files that are named" not in line]
+        told = [line for line in audited.done["warnings"][name] if not line.startswith("USD says")]
+        assert not any(str(audited.folder) in line for line in audited.done["warnings"][name]), name
+        assert [line for line in found if not line.startswith("USD found")] == told, name
+    texts = "\n".join(audited.done["warnings"]["textures"])
+    for look in ("Blob", "Plain", "Dotted", "Tiles"):
+        assert f"/{look}/Reader" in texts, look
