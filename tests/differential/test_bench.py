@@ -165,7 +165,7 @@ def test_where_another_memory_holds_the_same_fragments_nothing_is_rendered_again
 def test_where_the_buffers_of_the_pixels_leave_nothing_it_says_so(
     subject: Subject, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("renderer.techniques.kbuffer_importance.RANGE_BYTES", 12 + 60)
+    monkeypatch.setattr("renderer.techniques.kbuffer_importance._FACING_BYTES", 100)
     options = BenchOptions((), ("kbuffer-importance",), Path("unused"), budgets=(0.5,))
     _, cells = Bench(subject, options, None).measure(planned(options, None))
     assert cells[0].problem is None

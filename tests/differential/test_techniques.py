@@ -76,8 +76,10 @@ def test_every_pass_and_byte_is_reported(frame: Frame, dump: FragmentDump) -> No
     assert {
         "opaque",
         "count",
-        "gather-nearest",
+        "facing",
         "importance",
+        "range",
+        "bins",
         "prefix",
         "chain-depth",
         "chain-colour",
