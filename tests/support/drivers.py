@@ -14,11 +14,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from renderer.capture import capture
 from renderer.context import describe, gl_context
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.techniques.chain import one_pass_available
+from schemas.tail import BINNED_TAILS
 from services.stress import gl_drivers
 from services.stress.gl_drivers import Driver
 from support.scenes import SIZE, VIEW, shells
@@ -54,8 +57,14 @@ def facts(driver: Driver, runtime: Path) -> dict[str, Any]:
 
 def _own_facts() -> dict[str, Any]:
     ctx = gl_context()
-    dump = capture(Frame(GpuScene(ctx, shells()), VIEW, *SIZE)).dump
-    arrays = {name: getattr(dump, name) for name in ("offsets", "rgba", "depth", "background", "facing")}
+    frame = Frame(GpuScene(ctx, shells()), VIEW, *SIZE)
+    dump = capture(frame).dump
+    arrays = {name: getattr(dump, name) for name in ("offsets", "rgba", "depth", "background", "facing", "tile_range")}
+    for tail in BINNED_TAILS:
+        binned = frame.gather_bins(tail, counts=True)
+        assert binned.counts is not None
+        arrays[f"{tail} bins"] = np.concatenate([np.frombuffer(kept.read(), np.uint16) for kept in binned.kept])
+        arrays[f"{tail} counts"] = np.frombuffer(binned.counts.read(), np.uint8)
     return {
         "driver": describe(ctx),
         "one_pass": one_pass_available(ctx),
