@@ -28,14 +28,15 @@ _SOURCES: Mapping[StageName, tuple[str, ...]] = {
         "services.stages.scenes",
     ),
     "render": (
-        "schemas.fragments",
+        *("schemas.fragments", "schemas.tail"),
         *(f"renderer.{name}" for name in ("capture", "csr", "culling", "dump", "fragment_list")),
-        *(f"renderer.{name}" for name in ("frame", "gpu_scene", "programs")),
-        *(f"renderer.shaders.{name}" for name in ("common", "opaque", "count", "range", "gather", "capture")),
+        *(f"renderer.{name}" for name in ("frame", "gpu_scene", "programs", "tile_range")),
+        *(f"renderer.shaders.{name}" for name in ("common", "opaque", "range", "capture")),
         "services.stages.render",
     ),
     "label": (
-        *("labeller", "renderer.allocation", "renderer.features", "renderer.depth_bins", "renderer.dump"),
+        *("labeller", "renderer.allocation", "renderer.features", "renderer.depth_bins", "renderer.tile_range"),
+        "renderer.dump",
         *("schemas.tail", "schemas.colour", "schemas.skips", "schemas.pixel_weights"),
         "renderer.reference.flip",
         *("services.stages.label", "services.stages.allocations"),
@@ -48,7 +49,7 @@ _SOURCES: Mapping[StageName, tuple[str, ...]] = {
     "export": (
         *(f"trainer.{name}" for name in ("bundle", "dialects", "export_forms", "export_onnx", "export_shader")),
         *(f"trainer.{name}" for name in ("export_ubo", "glsl_network", "half", "parity", "prune", "self_test")),
-        "renderer.onnx_network",
+        *("renderer.features", "renderer.onnx_network"),
         "schemas.bundle",
         "services.stages.export",
     ),
@@ -58,15 +59,19 @@ _SOURCES: Mapping[StageName, tuple[str, ...]] = {
             f"renderer.{name}"
             for name in (
                 "allocation",
+                "bands",
+                "bin_pass",
                 "depth_bins",
                 "exr",
                 "exr_header",
                 "features",
                 "metrics",
                 "onnx_network",
+                "prefix",
                 "screen",
                 "shaders",
                 "techniques",
+                "tile_range",
             )
         ),
         *(f"services.stages.{name}" for name in ("evaluate", "shots", "pictures")),

@@ -13,6 +13,7 @@ from labeller.dataset import open_dataset
 from renderer.samples import write_samples
 from schemas.bundle import load_manifest
 from schemas.problem import Problem
+from schemas.tail import DEFAULT_TAIL
 from services import steps, summary
 from services.build import build
 from services.local import open_local
@@ -217,7 +218,7 @@ def test_opaque_scene_is_refused_with_the_way_out(tmp_path: Path) -> None:
     )
     assert made.held_out == ()
     assert not made.registry.champion, "one scene proves nothing, so nothing is promoted"
-    assert json.loads(Path(made.registry.folder, "manifest.json").read_text())["tail"]["name"] == "density-16"
+    assert json.loads(Path(made.registry.folder, "manifest.json").read_text())["tail"]["name"] == DEFAULT_TAIL
 
 
 def test_a_copy_of_a_scene_is_refused_since_the_split_is_by_content(samples: Path, tmp_path: Path) -> None:

@@ -110,7 +110,7 @@ def test_help_loads_nothing_heavy() -> None:
 
 def test_build_passes_its_options_on(pipeline: Callable[[Build], list[BuildOptions]]) -> None:
     asked = pipeline(succeed)
-    options = ["--alpha", "0.33", "--holdout", "bottles.usda", "--size", "64x48", "--tail", "paper", "--g", "0.5"]
+    options = ["--alpha", "0.33", "--holdout", "bottles.usda", "--size", "64x48", "--tail", "binned-8", "--g", "0.5"]
     options += ["--seed", "7", "--steps", "9", "--views-per-scene", "2", "--state", "state"]
     assert run([*BUILD, *options]) == ExitCode.OK
     assert asked == [
@@ -123,7 +123,7 @@ def test_build_passes_its_options_on(pipeline: Callable[[Build], list[BuildOptio
             views_per_scene=2,
             width=64,
             height=48,
-            tail="paper",
+            tail="binned-8",
             g=0.5,
             seed=7,
             steps=9,

@@ -314,7 +314,7 @@ def test_all_options_of_a_job_arrive(server: FakeServer, folder: Path) -> None:
     camera = {"eye": [0, 0, 5], "target": [0, 0, 0], "up": [0, 1, 0], "fov": 45}
     (folder / "views.json").write_text(json.dumps({"scenes": [{"main": "a.usdz", "views": [camera]}]}))
     options = ["--name", "glass", "--scene", "a.usdz", "--holdout", "b.usdz", "--budgets", "4,1", "--alpha", "0.33"]
-    options += ["--views-per-scene", "2", "--size", "64x48", "--tail", "paper", "--g", "0.5", "--seed", "7"]
+    options += ["--views-per-scene", "2", "--size", "64x48", "--tail", "binned-16", "--g", "0.5", "--seed", "7"]
     options += [
         "--network",
         "tiny",
@@ -351,7 +351,7 @@ def test_all_options_of_a_job_arrive(server: FakeServer, folder: Path) -> None:
         "views_per_scene": 2,
         "width": 64,
         "height": 48,
-        "tail": "paper",
+        "tail": "binned-16",
         "g": 0.5,
         "network": "tiny",
         "seed": 7,

@@ -6,10 +6,16 @@ import pytest
 from support.drivers import lavapipe_installed
 
 from renderer.techniques import TECHNIQUES
-from schemas.tail import TAILS
+from schemas.tail import BINNED_TAILS, TAILS
 from services.stress import gl
 from services.stress.findings import Finding, NotRun, Options, Row
 from services.stress.gl_drivers import ZINK
+
+PASSES = (
+    *("capture.bits", "range", "bins.kept", "bins.counts", "bins.colours"),
+    *("features", "features.kept", "features.half", "predict.glsl", "allocation"),
+    *("kbuffer-deep.F and K", "kbuffer-deep.overflowing network.F and K"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -25,11 +31,10 @@ def test_every_technique_and_tail_is_there(rows: list[Row]) -> None:
     paths = {row.path for row in rows}
     for driver in ("llvmpipe", "zink") if lavapipe_installed() else ("llvmpipe",):
         for name, entry in TECHNIQUES.items():
-            expected = {f"{name}.{tail} · {driver}" for tail in TAILS} if entry.family == "bounded" else set()
+            tails = BINNED_TAILS if entry.needs_bundle else TAILS
+            expected = {f"{name}.{tail} · {driver}" for tail in tails} if entry.family == "bounded" else set()
             assert paths >= (expected or {f"{name} · {driver}"})
-        assert paths >= {f"{path} · {driver}" for path in ("capture.bits", "gather", "features", "predict.glsl")}
-        assert paths >= {f"{path} · {driver}" for path in ("gather.half", "bins.shares", "features.front")}
-        assert paths >= {f"kbuffer-deep.{form}.F and K · {driver}" for form in ("binned sums", "overflowing network")}
+        assert paths >= {f"{path} · {driver}" for path in PASSES}
     cases = {row.case for row in rows if isinstance(row, Finding) and row.path == "sbuffer · llvmpipe"}
     assert cases == {"n up to 96", "n 4096"}
 

@@ -27,7 +27,7 @@ def cell(technique: str = "kbuffer", factor: float | None = 2.0, **values: Any) 
         "psnr": None if family == "exact" else 40.0,
         "ssim": 0.99,
         "flip": 0.01,
-        "k_min": 1,
+        "k_min": 0,
         "k_max": 4,
         "captured_fragments": 150,
         "pool_bytes": 1600,
@@ -42,7 +42,7 @@ def view(*cells: BenchCell, key: str = "a", **values: Any) -> BenchView:
     """A view with 400 fragments."""
     oracle = {"tail": "weighted-average", "g": None, "gap": None, "rule": "greedy"}
     optimum = {"tail": DEFAULT_TAIL, "g": DENSITY_G, "gap": 1e-6, "rule": "optimal"}
-    common = {"budget_factor": 2.0, "budget": 200, "mse_display": 1e-5, "k_min": 1, "k_max": 9}
+    common = {"budget_factor": 2.0, "budget": 200, "mse_display": 1e-5, "k_min": 0, "k_max": 9}
     marks = [
         Yardstick(**rule, **common, mse=mse, captured_fragments=200) for rule, mse in ((oracle, 2e-5), (optimum, 1e-5))
     ]

@@ -9,6 +9,7 @@ from typing import Any
 
 from schemas.measurement import Measurement
 from schemas.service import DatasetRecord, SceneRecord, ShardRef
+from schemas.tail import DEFAULT_TAIL, DENSITY_G
 from services.progress import SilentProgress
 from services.tasks import Facts, StageName, Task
 
@@ -40,7 +41,7 @@ def measurement(technique: str, mse: float, factor: float = 1.0, view: str = "vi
         width=16,
         height=16,
         alpha=None,
-        tail="density",
+        tail=DEFAULT_TAIL,
         mse=mse,
         total_fragments=1000,
     ).model_dump(mode="json", exclude={"scene"})
@@ -158,7 +159,7 @@ class TableRunner:
         shard = ShardRef(
             scene="a", scene_digest="1" * 64, view="view0", artifact="label/abc", sha256="0" * 64, bytes=10
         )
-        settings = {"alpha": 0.5, "size": [32, 16], "budgets": [2.0], "tail": "density", "g": 0.75, "seed": 3}
+        settings = {"alpha": 0.5, "size": [32, 16], "budgets": [2.0], "tail": DEFAULT_TAIL, "g": DENSITY_G, "seed": 3}
         return DatasetRecord(
             id="dst_" + "0" * 32, job_id=None, created="2026-01-01T00:00:00+00:00", settings=settings, shards=(shard,)
         )
