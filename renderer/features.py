@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from renderer.depth_bins import OPTICAL, BinForm, bin_form, keep_bins, kept_room, place_of
 from renderer.tile_range import pixel_ranges
 from schemas.fragments import FragmentDump
-from schemas.problem import Problem
-from schemas.tail import LUMA, MOST_BINS, OPTICAL_UNIT, TAILS, TailName
+from schemas.problem import ExitCode, Problem
+from schemas.tail import BINNED_TAILS, LUMA, MOST_BINS, OPTICAL_UNIT, TAILS, TailName
 
 SUMS: Final[tuple[str, ...]] = (
     *("n", "optical_depth", "z_near", "z_far"),
@@ -139,8 +139,14 @@ def gather(dump: FragmentDump, tail: TailName) -> NDArray[np.float32]:
         float32 [P, 4 TEXELS], columns `SUMS`; accumulated in float64. Rows of pixels without fragments are zero.
 
     Raises:
-        Problem: A depth is not finite.
+        Problem: The tail has no bins, or a depth is not finite.
     """
+    if tail not in BINNED_TAILS:
+        raise Problem(
+            f"There are no features of the tail {tail}: it has no depth bins.",
+            f"Use one of {', '.join(BINNED_TAILS)}.",
+            ExitCode.USAGE,
+        )
     if not np.isfinite(dump.depth).all():
         raise Problem(
             "The fragment dump has depths that are not finite.",

@@ -135,8 +135,8 @@ class JobSpec(BaseModel):
     def _consistent(self) -> Self:
         if self.kind in ("build", "train") and self.name is None:
             raise ValueError(f"a {self.kind} needs a name")
-        if self.kind in ("build", "train") and self.tail not in BINNED_TAILS:
-            raise ValueError(f"a {self.kind} makes a bundle, whose tail has depth bins: {', '.join(BINNED_TAILS)}")
+        if self.kind != "render" and self.tail not in BINNED_TAILS:
+            raise ValueError(f"labels are made of depth bins, so the tail is one of {', '.join(BINNED_TAILS)}")
         if self.kind == "evaluate" and self.model is None:
             raise ValueError("an evaluate needs a model")
         if self.begins_with is not None and self.kind not in ("build", "train"):

@@ -26,17 +26,19 @@ def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
     Raises:
         Problem: A GL picture differs from the CPU simulation of the same allocation.
     """
-    session = Session(desk, task)
-    budgets = zip(task.params["factors"], task.params["budgets"], strict=True)
-    shots = [Shot(session, folder, *budget) for budget in budgets]
-    kind = task.params["kind"]
-    measured = _baseline(session, shots, report) if kind == "baseline" else _bundle(shots, desk.bundle(task), report)
+    measured = (_baseline if task.params["kind"] == "baseline" else _bundle)(desk, task, folder, report)
     save_facts(folder, {"measurements": [m.model_dump(mode="json", exclude={"scene"}) for m in measured]})
 
 
-def _baseline(session: Session, shots: list[Shot], report: Report) -> list[Measurement]:
-    total, labels = session.dump.total, session.desk.artifact(session.task, "label")
-    measured = [Shot(session, shots[0].folder, total / session.frame.pixels, total).take_exact()]
+def _shots(session: Session, folder: Path) -> list[Shot]:
+    params = session.task.params
+    return [Shot(session, folder, *budget) for budget in zip(params["factors"], params["budgets"], strict=True)]
+
+
+def _baseline(desk: Desk, task: Task, folder: Path, report: Report) -> list[Measurement]:
+    session = Session(desk, task)
+    shots, total, labels = _shots(session, folder), session.dump.total, desk.artifact(task, "label")
+    measured = [Shot(session, folder, total / session.frame.pixels, total).take_exact()]
     for number, shot in enumerate(shots, start=1):
 
         def oracle(frame: Frame, _: Budget, fragments: int = shot.fragments) -> NDArray[np.int32]:
@@ -48,8 +50,9 @@ def _baseline(session: Session, shots: list[Shot], report: Report) -> list[Measu
     return measured
 
 
-def _bundle(shots: list[Shot], bundle: Path, report: Report) -> list[Measurement]:
-    technique = KBufferDeep(bundle)
+def _bundle(desk: Desk, task: Task, folder: Path, report: Report) -> list[Measurement]:
+    technique = KBufferDeep(desk.bundle(task))
+    shots = _shots(Session(desk, task, technique.manifest.tail), folder)
     measured = []
     for number, shot in enumerate(shots, start=1):
         measured.append(shot.take(technique))

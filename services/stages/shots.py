@@ -17,10 +17,12 @@ from renderer.exr import write_exr
 from renderer.exr_header import Attribute
 from renderer.frame import Frame
 from renderer.techniques import Budget, Rendered, SBuffer, Technique
+from schemas.bundle import TailSpec
 from schemas.colour import display8
 from schemas.fragments import FragmentDump
 from schemas.measurement import Measurement
 from schemas.problem import ExitCode, Problem
+from schemas.tail import TailName
 from schemas.view import View
 from services.stages.desk import Desk
 from services.stages.pictures import EXACT, counts_map, quantise_map, stem, write_png
@@ -38,11 +40,13 @@ class Session:
     Args:
         desk: Artifacts and the scene on the GPU.
         task: The evaluation.
+        trained: Tail of the bundle that is evaluated, which it renders whatever the task asks for; None: none is.
     """
 
-    def __init__(self, desk: Desk, task: Task) -> None:
+    def __init__(self, desk: Desk, task: Task, trained: TailSpec | None = None) -> None:
         self.desk, self.task = desk, task
-        self.tail, self.g = task.params["tail"], task.params["g"]
+        self.tail: TailName = task.params["tail"] if trained is None else trained.name
+        self.g: float = task.params["g"] if trained is None else trained.g
 
     @cached_property
     def frame(self) -> Frame:

@@ -81,9 +81,8 @@ def test_held_out_pictures_are_measured_next_to_fixed_vkb_and_oracle(built: Buil
         assert m.cpu_difference <= 1
         assert m.captured_fragments is not None
         assert m.captured_fragments <= m.budget
-    for m in measured:
         if m.technique == "kbuffer-deep":
-            assert m.captured_fragments == m.budget, "a predicted budget is met exactly"
+            assert m.captured_fragments > m.budget - 255, "a predicted budget is met up to one bin of one pixel"
 
 
 def test_oracle_is_never_worse_than_the_others(built: BuildResult) -> None:
@@ -140,6 +139,15 @@ def test_an_added_scene_is_the_only_one_rendered_and_labelled(built: BuildResult
     assert result.skipped["baseline pictures already rendered"] == 2
     assert result.registry.reference == "small@1.1.0"
     assert {entry.asset for entry in open_dataset(result.dataset).index.shards} >= {"bottles", "voxel_town"}
+
+
+def test_a_champion_of_another_tail_is_measured_with_its_own(samples: Path, tmp_path: Path) -> None:
+    small = {"scenes": (TRAIN[0], HELD_OUT), "budgets": (1.0,), "width": 64, "height": 48, "steps": 20}
+    first = build(options(samples, tmp_path, tail="binned-8", **small), SilentProgress())  # type: ignore[arg-type]
+    second = build(options(samples, tmp_path, **small), SilentProgress())  # type: ignore[arg-type]
+    assert (first.registry.reference, second.registry.reference) == ("small@1.0.0", "small@1.1.0")
+    assert second.registry.reason.endswith("of the champion 1.0.0 on these views.")
+    assert {m.tail for m in second.measurements} == {DEFAULT_TAIL}
 
 
 def test_interrupted_build_continues(samples: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,7 @@ import renderer
 from labeller import reference
 from renderer.features import FEATURES, SUMS, derive, features_glsl, gather, reads_colours, sums_read
 from schemas.fragments import FragmentDump
+from schemas.problem import Problem
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, OPTICAL_UNIT, TAILS, TailName
 
 
@@ -142,6 +143,12 @@ def test_a_subset_holds_only_what_is_asked_for() -> None:
     assert "x[0] = sqrt" in text
     assert "x[1] = log2" in text
     assert "rgb_mean" not in text
+
+
+@pytest.mark.parametrize("tail", [tail for tail in TAILS if tail not in BINNED_TAILS])
+def test_a_tail_without_bins_has_no_features(tail: TailName) -> None:
+    with pytest.raises(Problem, match=f"no features of the tail {tail}"):
+        gather(random_dump(4, 4, 3, seed=1), tail)
 
 
 def test_an_unknown_feature_is_refused() -> None:

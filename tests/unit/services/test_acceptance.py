@@ -18,6 +18,7 @@ from support.runner import TableRunner, scene
 from schemas.job import JobSpec
 from schemas.problem import ExitCode, Problem
 from schemas.service import ShardRef
+from schemas.tail import BINNED_TAILS, TAILS
 from services.acceptance import accept, begun_plan
 from services.database import open_database
 from services.fine_tuning import is_replayed
@@ -122,7 +123,7 @@ def test_what_was_learned_cannot_be_held_out(home: Home) -> None:
     assert caught.value.code is ExitCode.CHECK_FAILED
 
 
-@pytest.mark.parametrize("change", [{"tail": "exact-coverage"}, {"g": 0.5}, {"seed": 1}, {"weights": "flip"}])
+@pytest.mark.parametrize("change", [{"tail": "binned-8"}, {"g": 0.5}, {"seed": 1}, {"weights": "flip"}])
 def test_labels_of_another_kind_are_refused(home: Home, change: dict[str, Any]) -> None:
     with pytest.raises(Problem, match=f"trained on is labelled otherwise: {next(iter(change))} ") as caught:
         home.accept(spec(**change))
@@ -198,6 +199,14 @@ def test_what_trains_nothing_begins_with_nothing(kind: str) -> None:
     with pytest.raises(ValueError, match="trains nothing"):
         spec(kind=kind, model="glass")
     assert spec(kind=kind, model="glass", start="champion").begins_with is None, "it was allowed before"
+
+
+@pytest.mark.parametrize("tail", [tail for tail in TAILS if tail not in BINNED_TAILS])
+def test_what_labels_has_a_tail_with_bins(tail: str) -> None:
+    for kind in ("build", "label", "train", "evaluate"):
+        with pytest.raises(ValueError, match="the tail is one of binned-8, binned-12"):
+            spec(kind=kind, model="glass", start="scratch", tail=tail)
+    assert spec(kind="render", start="scratch", tail=tail).tail == tail
 
 
 @pytest.mark.parametrize(

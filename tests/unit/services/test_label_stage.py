@@ -21,6 +21,7 @@ from labeller.rules import allocate_curves
 from labeller.shards import read_shard
 from renderer.dump import write_dump
 from schemas.problem import Problem
+from schemas.tail import DEFAULT_TAIL
 from services.stages import label
 from services.stages.allocations import pixel_allocations, read_allocation
 from services.stages.desk import SHARD, load_facts
@@ -39,7 +40,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def _made(tmp_path_factory: pytest.TempPathFactory, **more: str) -> Path:
     rendered, made = tmp_path_factory.mktemp("render"), tmp_path_factory.mktemp("label")
     write_dump(rendered, DUMP)
-    params = {"budgets": BUDGETS, "tail": "density", "g": 0.75, "metric": "display", "seed": 3, **more}
+    params = {"budgets": BUDGETS, "tail": DEFAULT_TAIL, "g": 0.75, "metric": "display", "seed": 3, **more}
     task = Task(name="box front", stage="label", version="0", params=params)
     desk = SimpleNamespace(artifact=lambda task, stage: rendered)
     label.make(desk, task, made, lambda fraction, note: None)  # type: ignore[arg-type]
@@ -52,7 +53,7 @@ def facts(folder: Path) -> Facts:
 
 
 def test_every_budget_has_an_answer_in_the_order_asked(facts: Facts) -> None:
-    curves = error_curves(DUMP, "density")
+    curves = error_curves(DUMP, DEFAULT_TAIL)
     assert set(facts["errors"]) == set(RULES)
     for rule in RULES:
         expected = [found.error for found in allocate_curves(DUMP, curves, BUDGETS, rule)]
@@ -67,7 +68,7 @@ def test_a_budget_is_allocated_once_and_one_that_holds_everything_never(folder: 
     assert kept.attrs["budgets"] == [N // 4, N // 2]
     for rule in RULES:
         for budget in (N // 2, N // 4):
-            (made,) = allocate_curves(DUMP, error_curves(DUMP, "density"), [budget], rule)
+            (made,) = allocate_curves(DUMP, error_curves(DUMP, DEFAULT_TAIL), [budget], rule)
             assert read_allocation(folder, rule, budget).tolist() == made.k.tolist()
             assert pixel_allocations(folder, budget, 37)[rule] == made.k[37]
     with pytest.raises(Problem, match="has no allocations"):
@@ -106,9 +107,9 @@ def test_weights_are_in_the_rows_alone(facts: Facts, folder: Path, tmp_path_fact
     plain, weighted = read_shard(folder / SHARD), read_shard(other / SHARD)
     assert (plain.meta.weights, weighted.meta.weights) == ("none", "flip")
     assert np.array_equal(plain.pixel, weighted.pixel)
-    usual = error_curves(DUMP, "density")
+    usual = error_curves(DUMP, DEFAULT_TAIL)
     kept = [found.k for found in allocate_curves(DUMP, usual, [N // 4, N // 2], "optimal")]
-    counted = flip_weights(DUMP, kept, "density")
+    counted = flip_weights(DUMP, kept, DEFAULT_TAIL)
     first = weighted.hull_offsets[:-1][np.diff(weighted.hull_offsets) > 0]
     pixel = weighted.pixel[np.diff(weighted.hull_offsets) > 0]
     at_least = usual.at(np.zeros_like(DUMP.counts))[pixel]
