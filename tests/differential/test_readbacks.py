@@ -23,6 +23,7 @@ READ = {
     "adaptive": TOTALS,
     "depth-peeling": TOTALS,
     "dual-depth-peeling": TOTALS + 4,
+    "binned": 0,
     "weighted-average": 0,
     "weighted-blended": 0,
     "moment": 0,

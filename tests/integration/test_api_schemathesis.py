@@ -72,7 +72,8 @@ def _run(api: Api, folder: Path, *options: str) -> str:
     return done.stdout
 
 
-OPERATIONS = sum(len(operations) for operations in build_document()["paths"].values())
+OPERATIONS = sum(len(operations) for operations in build_document()["paths"].values()) - 1
+"""All but the one that gives the document itself, which schemathesis reads and leaves out."""
 
 
 def test_the_server_does_what_the_document_says(api: Api, tmp_path: Path) -> None:

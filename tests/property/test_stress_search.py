@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 
 from renderer.features import FEATURES, derive, gather
 from schemas.fragments import FragmentDump
-from schemas.tail import METRICS, TAILS, MetricName, TailName
+from schemas.tail import METRICS, TAIL_NAMES, MetricName, TailName
 from services.stress import search
 from services.stress.bounds import BOUNDS
 from services.stress.cases import dump_of
-from services.stress.features import SPREADS
+from services.stress.features import EVERY, SPREADS
 from services.stress.predictors import networks, real_features
 from services.stress.search import list_finding, worst_features, worst_list
 from services.stress.threads import one_thread
@@ -35,7 +35,7 @@ def dump_from(given_fragments: Fragments, background: tuple[int, int, int]) -> F
 
 
 @settings(max_examples=100, deadline=None)
-@given(fragments, st.tuples(level, level, level), st.sampled_from(TAILS), st.sampled_from(METRICS))
+@given(fragments, st.tuples(level, level, level), st.sampled_from(TAIL_NAMES), st.sampled_from(METRICS))
 def test_no_list_drives_the_error_of_its_curve_beyond_the_bound(
     listed: Fragments, background: tuple[int, int, int], tail: TailName, metric: MetricName
 ) -> None:
@@ -50,8 +50,8 @@ def test_no_list_drives_the_error_of_its_curve_beyond_the_bound(
 def test_no_list_drives_the_error_of_its_features_beyond_the_bounds(listed: Fragments, times: int) -> None:
     dump = dump_from(listed * times, (0, 0, 0))
     with one_thread():
-        found = derive(gather(dump))[0]
-    truth = features64(sums64(dump))[0]
+        found = derive(gather(dump, EVERY))[0]
+    truth = features64(sums64(dump, EVERY))[0]
     error = np.abs(found - truth)
     others = np.delete(error / np.maximum(np.abs(truth), 1.0), SPREADS)
     target(float(error[SPREADS].max()))

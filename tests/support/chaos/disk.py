@@ -7,7 +7,7 @@ from pathlib import Path
 
 from support.chaos.probe import FULL
 
-SIZE = "64m"
+SIZE = "192m"
 BALLAST = "ballast"
 
 
