@@ -3,7 +3,7 @@
 #include "bundle/predict.glsl"
 #include "common/depth_bins.glsl"
 #include "common/kept_bins.glsl"
-layout(std430, binding = 7) readonly buffer TileRange { uint tile_range[]; };  // [T, 2], float bits
+#include "common/tile_range.glsl"
 
 layout(binding = 0) uniform sampler2D background;
 #if COLOURS
@@ -14,13 +14,10 @@ uniform int width;
 
 void read_features(int p, uint fragments, out float x[DIAPHANE_FEATURES]) {
     ivec2 xy = ivec2(p % width, p / width);
-    int tile = xy.y / RANGE_TILE * ((width + RANGE_TILE - 1) / RANGE_TILE) + xy.x / RANGE_TILE;
     KeptBins kept = kept_at(xy);
     vec4 s[TEXELS];
     for (int i = 0; i < TEXELS; ++i) s[i] = vec4(0.0);
-    s[0] = vec4(
-        fragments, optical_depth_in(kept), uintBitsToFloat(tile_range[2 * tile]), uintBitsToFloat(tile_range[2 * tile + 1])
-    );
+    s[0] = vec4(fragments, optical_depth_in(kept), ends_of(xy, width));
 #if COLOURS
     s[1] = texelFetch(colours, xy, 0);
     s[2] = texelFetch(squares, xy, 0);
