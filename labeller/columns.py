@@ -46,11 +46,9 @@ def _rgb(name: str, meaning: str) -> dict[str, str]:
 FEATURE_MEANINGS: Final[Mapping[str, str]] = {
     "log_n": "log2 of the number of fragments n",
     "optical_depth": "log(1 + D), D = sum of -ln(1 - alpha)",
-    **_rgb("rgb_mean", "mean over the fragments, weighted by optical depth, gamma-2 encoded, 0..1"),
-    **_rgb("rgb_std", "standard deviation over the fragments, weighted by optical depth, gamma-2 encoded, 0..1"),
     **_rgb("background", "of what lies behind, gamma-2 encoded, 0..1"),
-    "depth_mean": "mean place y in the tile's range, weighted by optical depth, 0..1",
-    "luma_depth_cov": "covariance of gamma-2 encoded Rec. 709 luma with the place y, weighted by optical depth",
+    "luma_mean": "mean luma over the fragments, weighted by optical depth, gamma-2 encoded, 0..1",
+    "luma_std": "standard deviation of luma over the fragments, weighted by optical depth, gamma-2 encoded, 0..1",
     "depth_extent": "log(1e-4 + (z_far - z_near) / z_far) of the tile's range",
     **{
         f"front_{b}": f"share of D in front of depth bin {b}, counted from 0, 0..1; 0 where the tail has no such bin"

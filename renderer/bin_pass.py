@@ -1,110 +1,130 @@
-"""The additive pass that fills a binned tail's depth bins, and what a predictor reads beside them."""
+"""The pass that fills a binned tail's depth bins, and what lies in their place afterwards."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import moderngl
+import numpy as np
+from numpy.typing import NDArray
 
 from renderer.gpu_scene import run_for, set_uniforms
+from renderer.programs import Defines
+from schemas.limits import LIMITS
+from schemas.problem import ExitCode, Problem
 from schemas.tail import TAILS, Tail, TailName
 
 if TYPE_CHECKING:
     from renderer.frame import Frame
 
-RANGE, COUNTS = 7, 6
-"""Storage bindings of tile ranges and counts by bin, in every shader."""
-KEPT_UNIT = 3
-"""First of the texture units of what is kept of the bins, in every shader."""
-TARGETS = 8
-"""Of one pass, at most: what every GL has."""
-_COLOUR_BYTES = 8
-"""Of a texture of four half floats."""
+BINS, RANGE = 5, 7
+"""Storage bindings of a pixel's words and of tile ranges, in every shader."""
+CORE_WORDS: Final = 2
+"""Of a pixel's core, behind those of what is kept: where its run begins, its cut and cursor."""
+CURSOR_BITS: Final = 27
+"""Of a core's second word; the bits above are its cut."""
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Binned:
-    """What one additive pass leaves of a frame for a binned tail.
+    """A pixel's words (`shaders/common/bin_words.glsl`), in one buffer.
 
     Attributes:
         name: Name of the tail.
         tail: Its row.
-        kept: RGBA16 [H, W], one for each four bins: 16 bits a bin, as `shaders/common/kept_bins.glsl` says.
+        words: uint32 [P, words of a pixel], packed.
+        pixels: P.
         ranges: uint32 [T, 2], between which depths the bins of a tile's pixels lie, float bits.
-        counts: uint32 [P, bins / 4], fragments of each bin, 8 bits each, 255 for that many or more; None: not counted.
-        colours: RGBA16F [H, W], sums of colours as `shaders/gather/bins.frag` says; none, or two.
+        luma: Whether sums of luma are gathered too: one word more.
     """
 
     name: TailName
     tail: Tail
-    kept: list[moderngl.Texture]
+    words: moderngl.Buffer
+    pixels: int
     ranges: moderngl.Buffer
-    counts: moderngl.Buffer | None
-    colours: list[moderngl.Texture]
+    luma: bool = False
 
     @property
-    def kept_bytes(self) -> int:
-        """Bytes a pixel of what is kept, counts and colours included; ranges are an eighth of a byte."""
-        return self.tail.kept_bytes + self._beside
+    def pixel_words(self) -> int:
+        """Words of a pixel."""
+        return self.tail.bins + self.luma
 
     @property
-    def gathered_bytes(self) -> int:
-        """Bytes a pixel while it is gathered."""
-        return self.tail.gathered_bytes + self._beside
+    def pixel_bytes(self) -> int:
+        """Bytes of a pixel; ranges are an eighth of one more."""
+        return 4 * self.pixel_words
 
     @property
-    def _beside(self) -> int:
-        counted = 0 if self.counts is None else self.tail.bins
-        return counted + _COLOUR_BYTES * len(self.colours)
+    def defines(self) -> Defines:
+        """Of a shader that reads them."""
+        return word_defines(self.tail, self.luma)
+
+    @property
+    def free_slots(self) -> int:
+        """Slots of a pool that fit into what a pixel no longer needs once it has a core."""
+        return (self.pixel_words - self.tail.bins // 2 - CORE_WORDS) // 2
 
     def bind(self) -> None:
-        """Bind what the tail reads: tile ranges, and the bins from unit `KEPT_UNIT` on."""
+        """Bind the words and the tile ranges."""
+        self.words.bind_to_storage_buffer(BINS)
         self.ranges.bind_to_storage_buffer(RANGE)
-        for unit, texture in enumerate(self.kept, KEPT_UNIT):
-            texture.use(unit)
+
+    def read(self) -> NDArray[np.uint32]:
+        """uint32 [P, words of a pixel], read back."""
+        return np.frombuffer(self.words.read(), dtype=np.uint32).reshape(self.pixels, -1)
+
+    def write_cores(self, cut: NDArray[np.uint32], begin: NDArray[np.uint32]) -> None:
+        """Give every pixel its core: uint32 [P] each, bins in it and where its run of the pool begins."""
+        words, first = self.read().copy(), self.tail.bins // 2
+        words[:, first], words[:, first + 1] = begin, cut << np.uint32(CURSOR_BITS) | begin
+        self.words.write(words)
+
+    def counts(self) -> NDArray[np.uint8]:
+        """uint8 [P, BINS], fragments of each packed bin, `COUNT_LIMIT` for that many or more, read back."""
+        first = self.tail.bins // 2
+        return np.ascontiguousarray(self.read()[:, first : first + self.tail.bins // 4]).view(np.uint8)
+
+    def core_sizes(self) -> NDArray[np.int32]:
+        """int32 [P], fragments of each pixel's core, read back once all is captured."""
+        begin, core = self.read()[:, self.tail.bins // 2 :][:, :CORE_WORDS].T
+        return ((core & (1 << CURSOR_BITS) - 1).astype(np.int64) - begin).astype(np.int32)
 
 
-def gather_bins(frame: Frame, name: TailName, *, colours: bool = False, counts: bool = False) -> Binned:
+def word_defines(tail: Tail, luma: bool) -> Defines:
+    """Of a shader that reads a pixel's words."""
+    return {**tail.defines, "LUMA": int(luma), "PIXEL_WORDS": tail.bins + luma}
+
+
+def gather_bins(frame: Frame, name: TailName, *, luma: bool = False) -> Binned:
     """Fill the depth bins of every pixel, and pack them in their place.
-
-    Where colours do not fit into the targets beside 16 bins and their means, they are a pass of their own.
 
     Args:
         frame: The view.
         name: A tail with bins.
-        colours: Whether sums of colours are gathered too.
-        counts: Whether the fragments of each bin are counted too.
+        luma: Whether sums of luma are gathered too.
+
+    Raises:
+        Problem: The words are more than a storage buffer may hold.
     """
-    tail, ranges = TAILS[name], frame.tile_range()
-    bins = frame.targets(tail.bins // 4, "nu2")
-    means = frame.targets(tail.bins // 4, "nu2") if tail.mean_levels else []
-    sums = frame.targets(2, "f2") if colours else []
-    counted = frame.buffer(frame.pixels * tail.bins // 4, 0) if counts else None
-    ranges.bind_to_storage_buffer(RANGE)
-    if counted is not None:
-        counted.bind_to_storage_buffer(COUNTS)
-    fits = len(bins) + len(means) + len(sums) <= TARGETS
-    for targets, alone in [(bins + means + sums, 0)] if fits else [(bins + means, 0), (sums, 1)]:
-        defines = {
-            **tail.defines,
-            "ALONE": alone,
-            "COLOURS": int(colours and (fits or alone)),
-            "COUNTS": int(counts and not alone),
-        }
-        frame.draw_transparent("gather/bins.frag", frame.target(targets), defines)
+    tail = TAILS[name]
+    size = 4 * frame.pixels * (tail.bins + luma)
+    if size > LIMITS.words_bytes:
+        raise Problem(
+            f"The depth bins of {frame.pixels:,} pixels need {size / 2**20:.0f} MiB, "
+            f"above the limit of {LIMITS.words_bytes / 2**20:.0f} MiB.",
+            "Ask for a smaller picture or a tail of fewer bins.",
+            ExitCode.LIMIT,
+        )
+    words = frame.ctx.buffer(reserve=size)
+    words.clear()
+    binned = Binned(name, tail, words, frame.pixels, frame.tile_range(), luma)
+    binned.bind()
+    frame.draw_transparent("gather/bins.frag", frame.target([]), binned.defines)
     frame.ctx.memory_barrier()
-    frame.target([]).use()  # a context keeps alive what is bound: the targets, long after the last use of them
-    _pack(frame, tail, bins, means)
-    return Binned(name, tail, bins, ranges, counted, sums)
-
-
-def _pack(frame: Frame, tail: Tail, bins: list[moderngl.Texture], means: list[moderngl.Texture]) -> None:
-    program = frame.gpu.programs.compute("gather/pack.comp", tail.defines)
-    for unit, texture in enumerate(bins):
-        texture.bind_to_image(unit, read=True, write=True)
-    for unit, texture in enumerate(means):
-        texture.use(unit)
-    set_uniforms(program, {"width": frame.width, "pixels": frame.pixels})
+    program = frame.gpu.programs.compute("gather/pack.comp", binned.defines)
+    set_uniforms(program, {"pixels": frame.pixels})
     run_for(program, frame.pixels)
     frame.ctx.memory_barrier()
+    return binned

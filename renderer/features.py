@@ -4,10 +4,10 @@
 is the one source of every feature's formula: the shading languages' forms and `derive` are generated from it, and
 `services.stress.twins` has them once more, by hand and in float64.
 
-Colours are the stored gamma-2 values / 255, l the optical depth -ln(1-a) of a fragment, y its place from the nearest
-end of its tile's range (0) to the farthest (1) as depth bins see it (`renderer.depth_bins`). `front_b` is the share of
-the optical depth in front of bin b, `mean_b` the mean position in the bin before it, both as the tail keeps them; a
-tail of fewer bins, or without means, leaves the others 0.
+Colours are the stored gamma-2 values / 255, luma one such number for three, weighted by the optical depth -ln(1-a) of
+the fragments in the whole units of depth bins (`renderer.depth_bins`). `front_b` is the share of the optical depth in
+front of bin b, `mean_b` the mean position in the bin before it, both as the tail keeps them; a tail of fewer bins, or
+without means, leaves the others 0.
 """
 
 from __future__ import annotations
@@ -20,17 +20,25 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.depth_bins import OPTICAL, BinForm, bin_form, keep_bins, kept_room, place_of
+from renderer.depth_bins import UNITS, BinForm, bin_form, keep_bins, kept_room
 from renderer.tile_range import pixel_ranges
 from schemas.fragments import FragmentDump
 from schemas.problem import ExitCode, Problem
-from schemas.tail import BINNED_TAILS, LUMA, MOST_BINS, OPTICAL_UNIT, TAILS, TailName
+from schemas.tail import (
+    BINNED_TAILS,
+    LUMA,
+    LUMA_SHIFT,
+    LUMA_SQUARE_SHIFT,
+    MOST_BINS,
+    OPTICAL_UNIT,
+    TAILS,
+    TailName,
+)
 
 SUMS: Final[tuple[str, ...]] = (
     *("n", "optical_depth", "z_near", "z_far"),
-    *("sum_l_r", "sum_l_g", "sum_l_b", "sum_l_y_luma"),
-    *("sum_l_r2", "sum_l_g2", "sum_l_b2", "sum_l_y"),
-    *("background_r", "background_g", "background_b", "unused"),
+    *("background_r", "background_g", "background_b", "unused_background"),
+    *("sum_luma", "sum_luma2", "unused_luma", "unused_luma2"),
     *(f"front_{b}" for b in range(1, MOST_BINS)),
     "unused_front",
     *(f"mean_{b}" for b in range(1, MOST_BINS)),
@@ -39,11 +47,15 @@ SUMS: Final[tuple[str, ...]] = (
 """Columns of the raw sums: RGBA32F texels, in this order. Depths in metres: the ends of the tile's range."""
 
 TEXELS: Final = len(SUMS) // 4
-COLOUR_SUMS: Final = SUMS[4:12]
+LUMA_SUMS: Final = ("sum_luma", "sum_luma2")
 """What `gather/bins.frag` sums beside the bins."""
 
+_BACKGROUND: Final = SUMS.index("background_r")
+_LUMA: Final = SUMS.index("sum_luma")
 _FRONT: Final = SUMS.index("front_1")
 _MEAN: Final = SUMS.index("mean_1")
+_MOST: Final = 65_535
+"""Where a sum of luma stops: 16 bits."""
 
 
 def _channels(name: str, formula: str) -> dict[str, str]:
@@ -54,14 +66,9 @@ def _channels(name: str, formula: str) -> dict[str, str]:
 FORMULAS: Final[dict[str, str]] = {
     "log_n": "log2(n)",
     "optical_depth": "log(1.0 + optical_depth)",
-    **_channels("rgb_mean", "sum_l_$ * inv_d"),
-    **_channels("rgb_std", "sqrt(max(0.001, sum_l_$2 * inv_d - (sum_l_$ * inv_d) * (sum_l_$ * inv_d)))"),
     **_channels("background", "background_$"),
-    "depth_mean": "sum_l_y * inv_d",
-    "luma_depth_cov": (
-        "sum_l_y_luma * inv_d - (sum_l_y * inv_d)"
-        f" * ({LUMA[0]} * sum_l_r + {LUMA[1]} * sum_l_g + {LUMA[2]} * sum_l_b) * inv_d"
-    ),
+    "luma_mean": "sum_luma * inv_d",
+    "luma_std": "sqrt(max(0.001, sum_luma2 * inv_d - (sum_luma * inv_d) * (sum_luma * inv_d)))",
     "depth_extent": "log(1e-4 + (z_far - z_near) / max(1e-30, z_far))",
     **{f"front_{b}": f"front_{b}" for b in range(1, MOST_BINS)},
     **{f"mean_{b}": f"mean_{b}" for b in range(1, MOST_BINS)},
@@ -93,9 +100,9 @@ def sums_read(names: Sequence[str]) -> frozenset[str]:
     return frozenset(found for name in names for found in _NAME.findall(FORMULAS[name]) if found in SUMS)
 
 
-def reads_colours(names: Sequence[str]) -> bool:
+def reads_luma(names: Sequence[str]) -> bool:
     """Whether some features read sums that have to be gathered beside the bins."""
-    return not sums_read(names).isdisjoint(COLOUR_SUMS)
+    return not sums_read(names).isdisjoint(LUMA_SUMS)
 
 
 def features_glsl(names: Sequence[str] = FEATURES) -> str:
@@ -202,25 +209,19 @@ def _gather(
             continue
         kept, form = kept_room(), BinForm(bins, share_levels, mean_levels)
         units = keep_bins(form, depth[first:last], rgba[first:last], nearest[p], extent[p], kept)
-        acc = np.zeros(8)
+        light, square = 0, 0
         for i in range(first, last):
-            light = OPTICAL[rgba[i, 3]]
-            y = place_of(depth[i], nearest[p], extent[p], bins) / np.float32(bins)
-            luma = 0.0
-            for c in range(3):
-                value = rgba[i, c] / 255.0
-                acc[c] += light * value
-                acc[4 + c] += light * value * value
-                luma += LUMA[c] * value
-            acc[3] += light * y * luma
-            acc[7] += light * y
+            own = int(UNITS[rgba[i, 3]])
+            luma = (rgba[i, 0] * LUMA[0] + rgba[i, 1] * LUMA[1] + rgba[i, 2] * LUMA[2] + 128) >> 8
+            light += (own * luma + (1 << (LUMA_SHIFT - 1))) >> LUMA_SHIFT
+            square += (own * luma * luma + (1 << (LUMA_SQUARE_SHIFT - 1))) >> LUMA_SQUARE_SHIFT
         row = sums[p]
         row[0], row[1] = last - first, units / OPTICAL_UNIT
         row[2], row[3] = nearest[p], nearest[p] + extent[p]
-        for j in range(8):
-            row[4 + j] = acc[j]
         for c in range(3):
-            row[12 + c] = background[p, c] / 255.0
+            row[_BACKGROUND + c] = background[p, c] / 255.0
+        row[_LUMA] = min(light, _MOST) * np.float32((1 << LUMA_SHIFT) / 255.0) / np.float32(OPTICAL_UNIT)
+        row[_LUMA + 1] = min(square, _MOST) * np.float32((1 << LUMA_SQUARE_SHIFT) / 65025.0) / np.float32(OPTICAL_UNIT)
         for b in range(1, bins):
             row[_FRONT - 1 + b] = kept.front[b]
             if mean_levels:

@@ -83,7 +83,7 @@ class Frame:
         self._counts: moderngl.Buffer | None = None
         self._range: tuple[moderngl.Buffer, moderngl.Buffer] | None = None
         self._tile_range: moderngl.Buffer | None = None
-        self._binned: dict[tuple[TailName, bool, bool], Binned] = {}
+        self._kept: dict[TailName, Binned] = {}
         self._density: moderngl.Texture | None = None
         self._count_array: NDArray[np.uint32] | None = None
         with self.clock.measure("opaque"):
@@ -162,9 +162,10 @@ class Frame:
         """Float32 textures of the frame's size, zero, one for each number of components."""
         return self._zeroed([self.ctx.texture((self.width, self.height), count, dtype="f4") for count in components])
 
-    def targets(self, count: int, dtype: str) -> list[moderngl.Texture]:
-        """Textures of the frame's size with four components, zero."""
-        return self._zeroed([self.ctx.texture((self.width, self.height), 4, dtype=dtype) for _ in range(count)])
+    def targets(self, count: int, dtype: str, components: int = 4) -> list[moderngl.Texture]:
+        """Textures of the frame's size, zero."""
+        size = self.width, self.height
+        return self._zeroed([self.ctx.texture(size, components, dtype=dtype) for _ in range(count)])
 
     def _zeroed(self, made: list[moderngl.Texture]) -> list[moderngl.Texture]:
         """The same textures, of the frame's size, as targets."""
@@ -257,19 +258,18 @@ class Frame:
         self.target([]).use()
         return ranges
 
-    def gather_bins(self, tail: TailName, *, colours: bool = False, counts: bool = False) -> Binned:
-        """The depth bins of a tail, by one additive pass; arguments as `renderer.bin_pass.gather_bins` has them."""
-        key = (tail, colours, counts)
-        if key not in self._binned:
-            self.tile_range()
-            self.clock.passes.pop("bins", None)
-            with self.clock.measure("bins"):
-                self._binned[key] = gather_bins(self, tail, colours=colours, counts=counts)
-        return self._binned[key]
+    def gather_bins(self, tail: TailName, *, luma: bool = False) -> Binned:
+        """The depth bins of a tail, with sums of luma on demand; packed, and the caller's to change."""
+        self.tile_range()
+        self.clock.passes.pop("bins", None)
+        with self.clock.measure("bins"):
+            return gather_bins(self, tail, luma=luma)
 
-    def forget_bins(self, binned: Binned) -> None:
-        """Let go of what a technique is going to change or to give back; the pass runs again for the next one."""
-        self._binned = {key: kept for key, kept in self._binned.items() if kept is not binned}
+    def kept_bins(self, tail: TailName) -> Binned:
+        """The same for who only reads them, gathered once."""
+        if tail not in self._kept:
+            self._kept[tail] = self.gather_bins(tail)
+        return self._kept[tail]
 
     def gather_density(self) -> moderngl.Texture:
         """RGBA32F, what the `density` tail reads of every pixel: n, sum a, sum a^2, sum -ln(1-a)."""

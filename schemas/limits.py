@@ -19,6 +19,9 @@ class Limits:
     """Transparent fragments of one view: labelling takes up to 32 bytes for each."""
     buffer_bytes: int = 128 * 1024 * 1024
     """Bytes of one shader storage buffer: what llvmpipe advertises; larger captures go in bands of rows."""
+    words_bytes: int = 2**31
+    """Bytes of the one buffer that holds every pixel's words: what graphics cards' drivers take at least. Software drivers
+    advertise less, and take it, too."""
     budget: float = 4096.0
     """Fragments of a frame as a multiple of width * height."""
     budgets: int = 16

@@ -43,18 +43,18 @@ class Tail:
 
     @property
     def gathered_bytes(self) -> int:
-        """Bytes a pixel of the bins while they are gathered: 16 bits for each, and as many for its mean."""
-        return self.bins * (4 if self.mean_levels else 2)
+        """Bytes a pixel of the bins while they are gathered: one word for each."""
+        return self.bins * 4
 
     @property
     def kept_bytes(self) -> int:
-        """Bytes a pixel of what is kept of them, in the place of the former: 16 bits a bin."""
+        """Bytes a pixel of what is kept of them, in their place: 16 bits a bin."""
         return self.bins * 2
 
     @property
     def sum_bytes(self) -> int:
         """Bytes a pixel of the tail's sums."""
-        return 20 if self.bins else 32
+        return 10 if self.bins else 32
 
     @property
     def defines(self) -> dict[str, int | float]:
@@ -98,12 +98,15 @@ MOST_BINS: Final = max(tail.bins for tail in TAILS.values())
 DENSITY_G = 0.75
 """Default g of the density tail, `w_i = a_i exp(-g D x_i)`."""
 
-OPTICAL_UNIT = 951
+OPTICAL_UNIT = 253
 """Depth bins count optical depth in so many units of 1, up to BIN_LIMIT: integers, so that a sum does not depend on the
-order. No stored alpha's number of units is within .01 of a half, so that every logarithm rounds alike."""
+order. No stored alpha's number of units is within .004 of a half, so that every logarithm rounds alike."""
 
-BIN_LIMIT = 65_535
-"""Where a depth bin is full: 16 bits, an optical depth of 69, behind which nothing is visible."""
+BIN_LIMIT = 4095
+"""Where a depth bin is full: 12 bits, an optical depth of 16, behind which nothing is visible."""
+
+COUNT_LIMIT = 255
+"""Fragments of a depth bin, or more: 8 bits."""
 
 ROOT_SHARE = 0.6
 PLAIN_SHARE = 0.4
@@ -114,19 +117,34 @@ Two numbers, each the float32 nearest to it: languages differ in what `1 - ROOT_
 RANGE_TILE = 8
 """Side of the tiles, in pixels, whose nearest and farthest fragments the depth bins of their pixels lie between."""
 
+MOST_OPACITY = 16.0
+"""Where a binned tail's own optical depth stops: 16 bits, of which one unit is 1/4096; behind it nothing is visible."""
+
 LEAST_OTHERS = 1e-3
 """Optical depth of a bin's other fragments below which their mean says nothing: they are taken to lie in the middle."""
 
 LEAST_SPREAD = 1e-3
 """Half of the least length, in bins, that a bin's other fragments are spread over."""
 
-LUMA: Final = (0.2126, 0.7152, 0.0722)
-"""Rec. 709 luma of a stored colour, where one number stands for three."""
+LUMA: Final = (54, 183, 19)
+"""Rec. 709 luma of a stored colour, in 256ths: one whole number from 0 to 255 stands for three."""
+
+LUMA_SHIFT: Final = 6
+"""A pixel's word of luma has the sum of units times luma in its higher half, less so many of its lowest bits,"""
+LUMA_SQUARE_SHIFT: Final = 14
+"""and of units times its square in its lower half, less so many. Both are rounded, and stop at 16 bits."""
 
 BIN_CONSTANTS: Final[dict[str, int | float]] = {
     **{"ROOT_SHARE": ROOT_SHARE, "PLAIN_SHARE": PLAIN_SHARE, "OPTICAL_UNIT": OPTICAL_UNIT, "BIN_LIMIT": BIN_LIMIT},
-    **{"RANGE_TILE": RANGE_TILE, "LEAST_OTHERS": LEAST_OTHERS, "LEAST_SPREAD": LEAST_SPREAD},
+    **{"COUNT_LIMIT": COUNT_LIMIT},
+    **{
+        "RANGE_TILE": RANGE_TILE,
+        "MOST_OPACITY": MOST_OPACITY,
+        "LEAST_OTHERS": LEAST_OTHERS,
+        "LEAST_SPREAD": LEAST_SPREAD,
+    },
     **dict(zip(("LUMA_R", "LUMA_G", "LUMA_B"), LUMA, strict=True)),
+    **{"LUMA_SHIFT": LUMA_SHIFT, "LUMA_SQUARE_SHIFT": LUMA_SQUARE_SHIFT},
 }
 """Those of `shaders/common/depth_bins.glsl` that all bins share."""
 

@@ -6,8 +6,10 @@ which price each cut becomes the nearest to the k that the curve asks for: with 
 `t = -log lambda`, the cut of N fragments after one of M is nearer from `t = b ((M + N) / 2 - 1) - a` on.
 
 So a frame has events, each a price and the fragments that come with it, and the price that uses a budget is the last
-one up to which all of them fit: a selection by two counts of 2,048 bins, not a search. What is then left goes to the
-pixels that grow at the next price, by index, until one does not fit: `sum k <= F`, met up to one bin of one pixel.
+one up to which all of them fit: a selection by one count of 4,096 ranks of prices, not a search. What is then left goes
+to the pixels that grow at the next rank, by index, and the first that does not fit takes those of its bins that do:
+`sum k <= F`, met up to one bin of one pixel.
+Within a rank gains differ by a few per cent, so that which of them grow says little.
 
 All arithmetic is float32, operation by operation, and every sum is of integers: the shaders give the same to the bit.
 """
@@ -20,15 +22,19 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-FULL: Final = 255
+from schemas.tail import COUNT_LIMIT
+
+FULL: Final = COUNT_LIMIT
 """What a bin's count says of this many fragments or more: such a bin is never in a core."""
 MOST_CORE: Final = 1023
 """Fragments of one core: a shader sorts them by itself."""
-HALF_BITS: Final = 11
-"""Of a price's rank: two counts of 2^HALF_BITS bins find it."""
-DROPPED_BITS: Final = 32 - 2 * HALF_BITS
-"""Lowest bits of float32 that a price's rank does without: prices around 10 are 2^-10 apart."""
-LAST_RANK: Final = (1 << 2 * HALF_BITS) - 1
+RANKS: Final = 4096
+"""Of prices, as they are told apart."""
+LEAST_PRICE: Final = -8.0
+"""Prices up to 1 above it are one rank."""
+DROPPED_BITS: Final = 15
+"""Lowest bits of float32 that a price's rank does without, above LEAST_PRICE: prices from 8 to 24 are 1/16 apart."""
+_BITS_OF_ONE: Final = 0x3F800000
 MOST_GAIN: Final = 2.0**60
 LEAST_FALL: Final = 2.0**-12
 MOST_FALL: Final = 2.0**60
@@ -96,10 +102,10 @@ def importance_curve(importance: NDArray[np.floating]) -> tuple[NDArray[np.float
 
 
 def rank_of(price: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Ranks of prices: whole numbers that do not fall as prices rise, 0 to LAST_RANK."""
-    bits = np.ascontiguousarray(price, dtype=np.float32).view(np.uint32).astype(np.int64)
-    ordered = np.where(bits >> 31 == 1, 0xFFFFFFFF - bits, bits + 0x80000000)
-    return np.asarray(ordered >> DROPPED_BITS)
+    """Ranks of prices: whole numbers that do not fall as prices rise, 0 to RANKS - 1."""
+    above = np.maximum(np.asarray(price, dtype=np.float32) - np.float32(LEAST_PRICE), np.float32(1.0))
+    bits = np.ascontiguousarray(above).view(np.uint32).astype(np.int64)
+    return np.minimum(bits - _BITS_OF_ONE >> DROPPED_BITS, RANKS - 1)
 
 
 def usable_counts(counts: NDArray[np.integer]) -> NDArray[np.int64]:
@@ -144,9 +150,9 @@ def solve_cuts(events: Events, budget: int) -> Cuts:
     rank = int(ranks[np.searchsorted(spent, budget, side="right")]) - 1
     granted = (growth > 0) & (events.rank <= rank)
     more = (growth > 0) & (events.rank == rank + 1)
-    extra = (growth * more).sum(axis=1)
-    fits = np.cumsum(extra) <= budget - int((growth * granted).sum())
-    return _cuts(growth, granted | (more & fits[:, None]), rank)
+    # Pixel by pixel, in each bin by bin: up to the first of them that does not fit.
+    fits = np.cumsum((growth * more).ravel()) <= budget - int((growth * granted).sum())
+    return _cuts(growth, granted | (more & fits.reshape(more.shape)), rank)
 
 
 def _cuts(growth: NDArray[np.int64], granted: NDArray[np.bool_], rank: int | None) -> Cuts:

@@ -4,7 +4,7 @@
 
 - `begin`: fragments that can be in a core, and whether the budget covers them;
 - a predictor fills in the curves of the occupied pixels, unless it does;
-- `place`: two counts of fragments by price select the price that uses the budget, then cuts and their prefix sum.
+- `place`: a count of fragments by price selects the price that uses the budget, then cuts and their prefix sum.
 """
 
 from __future__ import annotations
@@ -14,31 +14,38 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from renderer.allocation.cuts import DROPPED_BITS, FULL, HALF_BITS, LEAST_FALL, MOST_CORE, MOST_FALL, MOST_GAIN
+from renderer.allocation.cuts import (
+    DROPPED_BITS,
+    FULL,
+    LEAST_FALL,
+    LEAST_PRICE,
+    MOST_CORE,
+    MOST_FALL,
+    MOST_GAIN,
+    RANKS,
+)
 from renderer.bin_pass import Binned
 from renderer.gpu_scene import run_for, set_uniforms
 from renderer.programs import Defines, Programs
 
 BLOCK = 2048
 """Pixels of a work group."""
-CURVE_BYTES = 8
-"""Bytes a pixel of the curves."""
 
 STATE = np.dtype(
     [
-        *((name, "<u4") for name in ("budget", "complete", "occupied", "fragments", "high", "rank", "spent")),
-        ("counted", "<u4", 1 << HALF_BITS),
+        *((name, "<u4") for name in ("budget", "complete", "occupied", "fragments", "rank", "spent")),
+        ("counted", "<u4", RANKS),
     ]
 )
 """`allocation/state.glsl`."""
 
 DEFINES: Defines = {
-    **{"BLOCK": BLOCK, "HALF_BITS": HALF_BITS, "DROPPED_BITS": DROPPED_BITS, "FULL": FULL, "MOST_CORE": MOST_CORE},
-    **{"MOST_GAIN": MOST_GAIN, "LEAST_FALL": LEAST_FALL, "MOST_FALL": MOST_FALL},
+    **{"BLOCK": BLOCK, "RANKS": RANKS, "LEAST_PRICE": LEAST_PRICE, "DROPPED_BITS": DROPPED_BITS},
+    **{"FULL": FULL, "MOST_CORE": MOST_CORE, "MOST_GAIN": MOST_GAIN, "LEAST_FALL": LEAST_FALL, "MOST_FALL": MOST_FALL},
 }
-"""Of the shaders of an allocation, and of those that write curves, beside BINS."""
+"""Of the shaders of an allocation, and of those that write curves, beside those of a tail."""
 
-_STATE, _COUNTS, _CURVES, _BLOCKS, _OFFSETS = range(5)
+_STATE, _BLOCKS = 0, 3
 """Storage bindings of `allocation/*.comp`."""
 
 
@@ -63,56 +70,42 @@ class FrameAllocation:
     Args:
         ctx: The context.
         programs: Of the context.
-        binned: The frame's bins, counted. Their counts become cuts and cursors.
+        binned: The frame's packed bins.
         pixels: P.
         budget: F.
     """
 
     def __init__(self, ctx: moderngl.Context, programs: Programs, binned: Binned, pixels: int, budget: int) -> None:
-        assert binned.counts is not None, "bins are counted"
-        self._ctx, self._programs, self._pixels = ctx, programs, pixels
-        self._defines = {**DEFINES, "BINS": binned.tail.bins}
+        self._ctx, self._programs, self._binned, self._pixels = ctx, programs, binned, pixels
+        self._defines = {**DEFINES, **binned.defines}
         self._blocks = -(-pixels // BLOCK)
         state = np.zeros(1, dtype=STATE)
         state["budget"] = min(budget, 2**32 - 1)
         self._buffers = {
             _STATE: ctx.buffer(state),
-            _COUNTS: binned.counts,
             _BLOCKS: ctx.buffer(reserve=8 * self._blocks),
         }
 
     def begin(self) -> None:
         """Find whether the budget covers all that can be in a core."""
         self._run("totals", self._blocks)
-        self._run("choose", 1, STEP=0)
+        self._run("complete", 1)
 
     def run_pixels(self, program: moderngl.ComputeShader) -> None:
-        """Run a shader on every pixel, as `run_for` does, with state and counts bound where these passes have them."""
-        for binding in (_STATE, _COUNTS):
-            self._buffers[binding].bind_to_storage_buffer(binding)
+        """Run a shader on every pixel, as `run_for` does, with state and bins bound where these passes have them."""
+        self._buffers[_STATE].bind_to_storage_buffer(_STATE)
+        self._binned.bind()
         set_uniforms(program, {"pixels": self._pixels})
         run_for(program, self._pixels)
         self._ctx.memory_barrier()
 
-    def place(self, curves: moderngl.Buffer) -> moderngl.Buffer:
-        """Select the price, and lay out the pool: counts become cuts and cursors.
-
-        Args:
-            curves: float32 [P, 2], a and b of the occupied pixels.
-
-        Returns:
-            uint32 [P], where each pixel's run of the pool begins.
-        """
-        offsets = self._ctx.buffer(reserve=4 * self._pixels)
-        self._buffers |= {_CURVES: curves, _OFFSETS: offsets}
-        for low in (0, 1):
-            self._run("count", self._blocks, LOW=low)
-            self._run("choose", 1, STEP=1 + low)
+    def place(self) -> None:
+        """Select the price, and lay out the pool: a pixel's counts and curve become its core."""
+        self._run("count", self._blocks)
+        self._run("choose", 1)
         self._run("blocks", self._blocks)
         self._run("scan", 1)
         self._run("place", self._blocks)
-        self._buffers.pop(_CURVES)  # nothing else reads them
-        return offsets
 
     def read_state(self) -> AllocationState:
         """What was found, for statistics after a frame."""
@@ -120,10 +113,11 @@ class FrameAllocation:
         complete = bool(state["complete"])
         return AllocationState(complete, int(state["occupied"]), None if complete else int(state["rank"]) - 1)
 
-    def _run(self, name: str, groups: int, **defines: int) -> None:
-        program = self._programs.compute(f"allocation/{name}.comp", {**self._defines, **defines})
+    def _run(self, name: str, groups: int) -> None:
+        program = self._programs.compute(f"allocation/{name}.comp", self._defines)
         for binding, buffer in self._buffers.items():
             buffer.bind_to_storage_buffer(binding)
+        self._binned.bind()
         set_uniforms(program, {"pixels": self._pixels, "blocks": self._blocks})
         program.run(groups)
         self._ctx.memory_barrier()

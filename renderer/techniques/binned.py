@@ -1,8 +1,7 @@
 """`binned`: a binned tail and nothing else, two additive passes (METHOD.md 2).
 
-The first pass gathers depth bins, the second weighs every fragment by what they know to be in front of it. There are no
-slots, no atomics, no order of fragments, and no network: additive blending into a few targets is all it needs.
-`kbuffer-deep` is this with a core.
+The first pass gathers depth bins, one atomic a fragment, the second weighs every fragment by what they know to be in
+front of it. There are no slots, no order of fragments, and no network. `kbuffer-deep` is this with a core.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from renderer.frame import Clock, Frame
 from renderer.techniques.base import Budget, Rendered
 from renderer.techniques.chain import TailInputs, tail_targets
 from renderer.techniques.sums import rendered, resolve_mean
-from schemas.tail import TAILS, TailName
+from schemas.tail import MOST_OPACITY, TAILS, TailName
 
 DEFAULT_BINS: Final[TailName] = "binned-16"
 
@@ -32,7 +31,7 @@ class Binned:
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame. `budget` is not used: what is kept of a pixel does not depend on its fragments."""
-        binned = frame.gather_bins(self._tail)
+        binned = frame.kept_bins(self._tail)
         tail = TailInputs(TAILS[self._tail], binned=binned)
         clock = Clock(frame.ctx)
         with clock.measure("tail"):
@@ -40,6 +39,6 @@ class Binned:
             target = frame.target([colours, depths])
             frame.draw_transparent("binned/tail.frag", target, tail.defines, **tail.bind())
         with clock.measure("resolve"):
-            image = resolve_mean(frame, colours, depths)
+            image = resolve_mean(frame, colours, depths, MOST_OPACITY)
         shared = frame.passes("opaque", "range", "bins")
-        return rendered(frame, image, shared, clock, tail.pixel_bytes, early_bytes=binned.gathered_bytes)
+        return rendered(frame, image, shared, clock, tail.pixel_bytes)

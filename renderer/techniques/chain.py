@@ -20,7 +20,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.bin_pass import KEPT_UNIT, Binned
+from renderer.bin_pass import Binned
 from renderer.csr import offsets_of
 from renderer.frame import Clock, Frame
 from renderer.programs import Defines
@@ -35,6 +35,8 @@ SLOT_BYTES = 8
 """Depth and packed colour."""
 RANGE_BYTES = 12
 """n and depth range of a pixel."""
+_DENSITY_UNIT = 3
+"""Texture unit of what the density tail reads."""
 OFFSET_BYTES = 4
 """Where a pixel's run of slots begins."""
 
@@ -79,7 +81,8 @@ class TailInputs:
         """Of the shaders."""
         if self.tail is None:
             return {"TAIL": NO_TAIL}
-        return {**self.tail.defines, "MAX_EXPONENT": MAX_EXPONENT}
+        own = self.tail.defines if self.binned is None else self.binned.defines
+        return {**own, "MAX_EXPONENT": MAX_EXPONENT}
 
     @property
     def passes(self) -> tuple[str, ...]:
@@ -93,21 +96,15 @@ class TailInputs:
         """Bytes a pixel beside the pool: of what is read, and of the tail's sums."""
         if self.tail is None:
             return 0
-        read = self.binned.kept_bytes if self.binned is not None else 16 if self.density is not None else 0
-        return read + self.tail.sum_bytes
-
-    @property
-    def early_bytes(self) -> int:
-        """Bytes a pixel while it is gathered."""
-        return self.binned.gathered_bytes if self.binned is not None else 0
+        return self.tail.gathered_bytes + (16 if self.density is not None else 0) + self.tail.sum_bytes
 
     def bind(self) -> dict[str, Any]:
         """Bind it; the uniforms of the shaders."""
+        if self.density is not None:
+            self.density.use(_DENSITY_UNIT)
         if self.binned is not None:
             self.binned.bind()
-        if self.density is not None:
-            self.density.use(KEPT_UNIT)
-        return {"gathered": KEPT_UNIT, "density_g": self.g}
+        return {"gathered": _DENSITY_UNIT, "density_g": self.g}
 
 
 def tail_inputs(frame: Frame, budget: Budget, *, complete: bool = False) -> TailInputs:
@@ -122,7 +119,7 @@ def tail_inputs(frame: Frame, budget: Budget, *, complete: bool = False) -> Tail
         return TailInputs(None)
     tail = TAILS[budget.tail]
     if tail.kind == TailKind.BINNED:
-        return TailInputs(tail, budget.g, binned=frame.gather_bins(budget.tail))
+        return TailInputs(tail, budget.g, binned=frame.kept_bins(budget.tail))
     if tail.kind == TailKind.DENSITY:
         return TailInputs(tail, budget.g, density=frame.gather_density())
     return TailInputs(tail, budget.g)
@@ -176,7 +173,7 @@ def render_chain(
         captured=int(k.sum(dtype=np.int64)),
         pool_bytes=SLOT_BYTES * total,
         pixel_bytes=OFFSET_BYTES + RANGE_BYTES + inputs.pixel_bytes,
-        early_bytes=RANGE_BYTES + max(before, inputs.early_bytes),
+        early_bytes=RANGE_BYTES + before,
         skips={**frame_skips(frame), TAIL: int(complete)},
     )
 
@@ -244,10 +241,16 @@ def _draw_with_tail(frame: Frame, fragment: str, tail: TailInputs) -> list[moder
 
 
 def tail_targets(frame: Frame, tail: TailInputs) -> list[moderngl.Texture]:
-    """Targets for a tail's sums, zero: weighted colour and weight, and its opacity; none without a tail."""
+    """Targets for a tail's sums, zero: weighted colour and weight, and its opacity; none without a tail.
+
+    Behind bins, they are half floats and 16-bit whole numbers: half of the bytes, for less than a hundredth more error in
+    all but clouds of thousands of cards.
+    """
     if tail.tail is None:
         return []
-    return frame.float_targets(4, 1 if tail.tail.bins else 4)
+    if tail.tail.bins:
+        return [*frame.targets(1, "f2"), *frame.targets(1, "nu2", 1)]
+    return frame.float_targets(4, 4)
 
 
 def resolve_slots(

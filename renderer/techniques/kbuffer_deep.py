@@ -1,10 +1,10 @@
 """`kbuffer-deep`: whole bins of every pixel by a bundle's network, run as its own GLSL (METHOD.md 4).
 
-Two geometry passes. The first gathers depth bins, the fragments in each, and sums of colours; of those the network
-predicts every pixel's gain curve, and a price is selected that uses the budget (`renderer.allocation.gpu`). So it is
-known how many of its bins are a pixel's core, and how many fragments they have: the second pass appends these and
-blends the others into the tail. Then cores are sorted and resolved. Nothing is read back within a frame, and the
-picture is the same to the bit whatever the order of the fragments, but for the rounding of the tail's sums.
+Two geometry passes. The first gathers depth bins and the fragments in each; of those the network predicts every pixel's
+gain curve, and a price is selected that uses the budget (`renderer.allocation.gpu`). So it is known how many of its
+bins are a pixel's core, and how many fragments they have: the second pass appends these and blends the others into the
+tail. Then cores are sorted and resolved. Nothing is read back within a frame, and the picture is the same to the bit
+whatever the order of the fragments, but for the rounding of the tail's sums.
 """
 
 from __future__ import annotations
@@ -18,25 +18,18 @@ from numpy.typing import NDArray
 
 from renderer import timing
 from renderer.allocation.cuts import events_of, importance_curve, solve_cuts
-from renderer.allocation.gpu import CURVE_BYTES, DEFINES, FrameAllocation
-from renderer.bin_pass import Binned
+from renderer.allocation.gpu import DEFINES, FrameAllocation
+from renderer.bin_pass import Binned, word_defines
 from renderer.csr import offsets_of
-from renderer.features import TEXELS, reads_colours
+from renderer.features import TEXELS, reads_luma
 from renderer.frame import Clock, Frame
 from renderer.gpu_scene import run_for, set_uniforms
 from renderer.onnx_network import OnnxNetwork
 from renderer.programs import Defines
 from renderer.screen import read_linear
 from renderer.techniques.base import Budget, Rendered
-from renderer.techniques.chain import (
-    OFFSET_BYTES,
-    SLOT_BYTES,
-    Memory,
-    TailInputs,
-    resolve_slots,
-    tail_targets,
-)
-from renderer.techniques.skips import PREDICTOR, UNREAD_COLOURS, frame_skips
+from renderer.techniques.chain import SLOT_BYTES, Memory, TailInputs, resolve_slots, tail_targets
+from renderer.techniques.skips import PREDICTOR, UNREAD_LUMA, frame_skips
 from schemas.bundle import GLSL, ONNX, load_manifest
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
@@ -48,10 +41,8 @@ _GROUP = 64
 _DISPATCH = 65535 * _GROUP
 """Pixels of one dispatch: the least maximum of work groups that GL promises."""
 
-# Storage bindings: of capturing and resolving, and of kbuffer-deep/predict.comp; those of curves.comp are the
-# allocation's.
-_OFFSETS, _COUNTS, _POOL, _, _RESULT = range(5)
-_PIXELS, _CURVES = 0, 2
+# Storage bindings of kbuffer-deep/*; those of curves.comp are the allocation's.
+_PIXELS, _, _POOL, _, _RESULT = range(5)
 
 
 class KBufferDeep:
@@ -73,10 +64,10 @@ class KBufferDeep:
         self.manifest = load_manifest(bundle)
         self._texts = {"bundle/predict.glsl": (bundle / GLSL).read_text(encoding="utf-8")}
         self._tail = TAILS[self.manifest.tail.name]
-        self._colours = reads_colours(self.manifest.feature_names)
+        self._luma = reads_luma(self.manifest.feature_names)
         self._defines: Defines = {
-            **{"TEXELS": TEXELS, "COLOURS": int(self._colours), "OUTPUTS": len(self.manifest.outputs)},
-            **self._tail.defines,
+            **{"TEXELS": TEXELS, "OUTPUTS": len(self.manifest.outputs)},
+            **word_defines(self._tail, self._luma),
             **DEFINES,
         }
         self._network = OnnxNetwork(bundle / ONNX) if inference == "onnx" else None
@@ -95,72 +86,62 @@ class KBufferDeep:
                 f"Leave out --tail, or train a bundle with `diaphane build --tail {budget.tail}`.",
                 ExitCode.USAGE,
             )
-        binned = frame.gather_bins(budget.tail, colours=self._colours, counts=True)
-        frame.forget_bins(binned)  # its counts become cuts
-        early = max(binned.gathered_bytes, binned.kept_bytes + CURVE_BYTES)
+        binned = frame.gather_bins(budget.tail, luma=self._luma)
         clock = Clock(frame.ctx)
         if self._network is None:
             allocation = FrameAllocation(frame.ctx, frame.gpu.programs, binned, frame.pixels, budget.fragments)
-            offsets = self._place(frame, binned, allocation, clock)
+            self._place(frame, binned, allocation, clock)
         else:
-            offsets, complete = self._place_on_cpu(frame, binned, budget.fragments, clock)
-        binned.colours.clear()
-        image = self._draw(frame, clock, binned, offsets, budget)
+            complete = self._place_on_cpu(frame, binned, budget.fragments, clock)
+        image = self._draw(frame, clock, binned, budget)
         linear = read_linear(frame, image)
         # The frame is over: what follows are its statistics.
         if self._network is None:
             complete = allocation.read_state().complete
-        k = self._kept(frame, binned, offsets)
+        k = binned.core_sizes()
+        peak = binned.pixel_bytes + self._tail.sum_bytes
+        free = SLOT_BYTES * binned.free_slots if _fits(binned, budget) else 0
         return Rendered(
             linear=linear,
             k=k,
             passes={**frame.passes("opaque", "range", "bins"), **clock.passes},
             captured=int(k.sum(dtype=np.int64)),
             pool_bytes=SLOT_BYTES * budget.fragments,
-            pixel_bytes=binned.kept_bytes + OFFSET_BYTES + self._tail.sum_bytes,
-            early_bytes=early,
-            skips={**frame_skips(frame), PREDICTOR: int(complete), UNREAD_COLOURS: int(not self._colours)},
+            pixel_bytes=peak - free,
+            early_bytes=peak,
+            skips={**frame_skips(frame), PREDICTOR: int(complete), UNREAD_LUMA: int(not self._luma)},
         )
 
-    def _place(self, frame: Frame, binned: Binned, allocation: FrameAllocation, clock: Clock) -> moderngl.Buffer:
-        """Predict curves and choose cuts on the GPU; the offsets of the cores in the pool."""
+    def _place(self, frame: Frame, binned: Binned, allocation: FrameAllocation, clock: Clock) -> None:
+        """Predict curves and choose cuts on the GPU."""
         with clock.measure("predict"):
             allocation.begin()
-            curves = self._curves(frame, binned, allocation)
+            self._predict_curves(frame, binned, allocation)
         with clock.measure("allocate"):
-            return allocation.place(curves)
+            allocation.place()
 
-    def _curves(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> moderngl.Buffer:
+    def _predict_curves(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> None:
         """Run the network on the occupied pixels."""
         program = frame.gpu.programs.compute("kbuffer-deep/curves.comp", self._defines, self._texts)
-        curves = frame.buffer(CURVE_BYTES // 4 * frame.pixels, None)
         self._bind(frame, binned)
-        curves.bind_to_storage_buffer(_CURVES)
         set_uniforms(program, {"width": frame.width})
         allocation.run_pixels(program)
-        return curves
 
-    def _place_on_cpu(self, frame: Frame, binned: Binned, fragments: int, clock: Clock) -> tuple[moderngl.Buffer, bool]:
+    def _place_on_cpu(self, frame: Frame, binned: Binned, fragments: int, clock: Clock) -> bool:
         """The same with the network in onnxruntime, and whether all that can be in a core is."""
-        assert binned.counts is not None, "bins are counted"
-        words = self._tail.bins // 4
         with clock.measure("predict"):
             with timing.readback(frame.ctx):
-                read = np.frombuffer(binned.counts.read(4 * words * frame.pixels), dtype=np.uint8)
-            counts = read.reshape(frame.pixels, self._tail.bins)
+                counts = binned.counts()
             occupied = np.flatnonzero(counts.any(axis=1)).astype(np.uint32)
             answers = self._answers(frame, binned, occupied)
         with clock.measure("allocate"):
             is_curve = self.manifest.head == "gain-curve"
             curve = (answers[:, 0], answers[:, 1]) if is_curve else importance_curve(answers[:, 0])
             found = solve_cuts(events_of(*curve, counts[occupied]), fragments)
-            cores = np.zeros((frame.pixels, words), dtype=np.uint32)
-            k = np.zeros(frame.pixels, dtype=np.int64)
-            cores[occupied, 0], k[occupied] = found.cut, found.k
-            offsets = offsets_of(k)[:-1].astype(np.uint32)
-            cores[:, 1] = offsets
-            binned.counts.write(cores)
-        return frame.ctx.buffer(offsets), found.rank is None
+            cut, k = np.zeros(frame.pixels, dtype=np.uint32), np.zeros(frame.pixels, dtype=np.int64)
+            cut[occupied], k[occupied] = found.cut, found.k
+            binned.write_cores(cut, offsets_of(k)[:-1].astype(np.uint32))
+        return found.rank is None
 
     def predict(self, frame: Frame, pixels: NDArray[np.uint32]) -> NDArray[np.float32]:
         """Run the network.
@@ -187,7 +168,7 @@ class KBufferDeep:
         return self._dispatch(frame, self._counted(frame), pixels, len(self.manifest.features), features_only=True)
 
     def _counted(self, frame: Frame) -> Binned:
-        return frame.gather_bins(self.manifest.tail.name, colours=self._colours, counts=True)
+        return frame.gather_bins(self.manifest.tail.name, luma=self._luma)
 
     def _answers(self, frame: Frame, binned: Binned, pixels: NDArray[np.uint32]) -> NDArray[np.float32]:
         if self._network is None:
@@ -207,8 +188,7 @@ class KBufferDeep:
         rows = min(len(pixels), _DISPATCH, LIMITS.buffer_bytes // (4 * columns))
         result, listed = frame.ctx.buffer(reserve=4 * columns * rows), frame.ctx.buffer(pixels)
         self._bind(frame, binned)
-        assert binned.counts is not None, "bins are counted"
-        for binding, buffer in ((_PIXELS, listed), (_COUNTS, binned.counts), (_RESULT, result)):
+        for binding, buffer in ((_PIXELS, listed), (_RESULT, result)):
             buffer.bind_to_storage_buffer(binding)
         set_uniforms(program, {"width": frame.width, "pixels": len(pixels)})
         for first in range(0, len(pixels), rows):
@@ -222,35 +202,30 @@ class KBufferDeep:
 
     @staticmethod
     def _bind(frame: Frame, binned: Binned) -> None:
-        """Bind what `kbuffer-deep/inputs.glsl` reads beside the counts."""
+        """Bind what `kbuffer-deep/inputs.glsl` reads."""
         binned.bind()
-        for unit, texture in enumerate([frame.background, *binned.colours]):
-            texture.use(unit)
+        frame.background.use(0)
 
-    def _draw(
-        self, frame: Frame, clock: Clock, binned: Binned, offsets: moderngl.Buffer, budget: Budget
-    ) -> moderngl.Texture:
+    def _draw(self, frame: Frame, clock: Clock, binned: Binned, budget: Budget) -> moderngl.Texture:
         """Capture cores and tail, sort, resolve."""
-        assert binned.counts is not None, "bins are counted"
         tail = TailInputs(self._tail, binned=binned)
+        runs = {"RUNS": 1, "IN_WORDS": int(_fits(binned, budget))}
         with clock.measure("capture"):
-            pool = frame.buffer(SLOT_BYTES // 4 * budget.fragments, None)
-            tails = tail_targets(frame, tail)
-            for binding, buffer in ((_OFFSETS, offsets), (_COUNTS, binned.counts), (_POOL, pool)):
-                buffer.bind_to_storage_buffer(binding)
-            frame.draw_transparent("kbuffer-deep/capture.frag", frame.target(tails), tail.defines, **tail.bind())
+            if not runs["IN_WORDS"]:
+                pool = frame.buffer(SLOT_BYTES // 4 * budget.fragments, None)
+                pool.bind_to_storage_buffer(_POOL)
+            tails, defines = tail_targets(frame, tail), {**tail.defines, **runs}
+            frame.draw_transparent("kbuffer-deep/capture.frag", frame.target(tails), defines, **tail.bind())
             frame.ctx.memory_barrier()
         with clock.measure("sort"):
-            program = frame.gpu.programs.compute("kbuffer-deep/sort.comp", {"BINS": self._tail.bins})
+            program = frame.gpu.programs.compute("kbuffer-deep/sort.comp", {**binned.defines, **runs})
             set_uniforms(program, {"pixels": frame.pixels})
             run_for(program, frame.pixels)
             frame.ctx.memory_barrier()
         with clock.measure("resolve"):
-            return resolve_slots(frame, tail, tails, 2, self._memory, {"CURSOR": self._tail.bins // 4})
+            return resolve_slots(frame, tail, tails, 2, self._memory, runs)
 
-    def _kept(self, frame: Frame, binned: Binned, offsets: moderngl.Buffer) -> NDArray[np.int32]:
-        """int32 [P], fragments of each pixel's core, read back."""
-        assert binned.counts is not None, "bins are counted"
-        words = np.frombuffer(binned.counts.read(binned.tail.bins * frame.pixels), dtype=np.uint32)
-        begin = np.frombuffer(offsets.read(4 * frame.pixels), dtype=np.uint32)
-        return (words.reshape(frame.pixels, -1)[:, 1].astype(np.int64) - begin).astype(np.int32)
+
+def _fits(binned: Binned, budget: Budget) -> bool:
+    """Whether the pool lies in words that pixels no longer need."""
+    return budget.fragments <= binned.pixels * binned.free_slots

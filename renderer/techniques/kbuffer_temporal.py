@@ -67,8 +67,8 @@ DEFINES: Final[Defines] = {
 }
 """Of `kbuffer-temporal/*`."""
 
-_CURVES, _MEMORY = 2, 6
-"""Storage bindings of kbuffer-temporal/correct.comp beside the allocation's."""
+_MEMORY = 6
+"""Storage binding of kbuffer-temporal/correct.comp beside the allocation's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,14 +152,12 @@ class KBufferTemporal(KBufferDeep):
             early_bytes=rendered.early_bytes + MEMORY_BYTES,
         )
 
-    def _curves(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> moderngl.Buffer:
+    def _predict_curves(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> None:
         """What the network predicts, corrected by what was seen of the last frame."""
-        curves = super()._curves(frame, binned, allocation)
+        super()._predict_curves(frame, binned, allocation)
         assert self._memory is not None, "render is before"
-        defines = {**ALLOCATION_DEFINES, **DEFINES, "BINS": binned.tail.bins}
+        defines = {**ALLOCATION_DEFINES, **DEFINES, **binned.defines}
         program = frame.gpu.programs.compute("kbuffer-temporal/correct.comp", defines)
-        curves.bind_to_storage_buffer(_CURVES)
         self._memory.buffer.bind_to_storage_buffer(_MEMORY)
         set_uniforms(program, {"still": int(self._still)})
         allocation.run_pixels(program)
-        return curves

@@ -13,15 +13,19 @@ from renderer.techniques.base import Rendered
 from renderer.techniques.skips import frame_skips
 
 
-def resolve_mean(frame: Frame, colours: moderngl.Texture, depths: moderngl.Texture) -> moderngl.Texture:
+def resolve_mean(
+    frame: Frame, colours: moderngl.Texture, depths: moderngl.Texture, depth_unit: float = 1.0
+) -> moderngl.Texture:
     """`(1 - T) sum w C / sum w + T C_bg` with `T = exp(-optical depth)`; RGBA32F, linear.
 
     Args:
         frame: The view.
-        colours: RGBA32F, `sum w C` and `sum w`.
-        depths: R32F, `sum -ln(1-a)`.
+        colours: `sum w C` and `sum w`.
+        depths: `sum -ln(1-a)`, in a unit.
+        depth_unit: The unit.
     """
-    return resolve_screen(frame, "common/weighted_mean.frag", [frame.background, colours, depths])
+    textures, defines = [frame.background, colours, depths], {"DEPTH_UNIT": depth_unit}
+    return resolve_screen(frame, "common/weighted_mean.frag", textures, defines)
 
 
 def rendered(

@@ -1,5 +1,5 @@
-// A pixel's bins as an allocation sees them. counts: [P, FOURS] words of 8 bits a bin (gather/bins.frag).
-layout(std430, binding = 1) buffer Counts { uint counts[]; };
+// A pixel's packed bins as an allocation sees them.
+#include "common/bin_words.glsl"
 const int FOURS = BINS / 4;
 
 struct PixelBins {
@@ -8,7 +8,7 @@ struct PixelBins {
 
 PixelBins bins_of(uint p) {
     PixelBins bins;
-    for (int i = 0; i < FOURS; ++i) bins.word[i] = counts[p * uint(FOURS) + uint(i)];
+    for (int i = 0; i < FOURS; ++i) bins.word[i] = bin_word[counts_at(i, p)];
     return bins;
 }
 
@@ -29,4 +29,14 @@ uint known_fragments(PixelBins bins) {
 // Whether a bin of so many fragments can be in a core behind `before` others; those behind it cannot where it cannot.
 bool fits(uint own, uint before) {
     return own < uint(FULL) && before + own <= uint(MOST_CORE);
+}
+
+// A predicted curve, log gain(k) = a - b (k - 1).
+vec2 curve_of(uint p) {
+    return uintBitsToFloat(uvec2(bin_word[curve_at(0, p)], bin_word[curve_at(1, p)]));
+}
+
+void put_curve(uint p, vec2 curve) {
+    bin_word[curve_at(0, p)] = floatBitsToUint(curve.x);
+    bin_word[curve_at(1, p)] = floatBitsToUint(curve.y);
 }

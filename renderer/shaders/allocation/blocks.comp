@@ -1,5 +1,6 @@
 #version 450
-// Fragments of every block of pixels: granted, and what they grow by at the chosen rank.
+// The cut of every pixel, in place of its curve, and fragments of every block of pixels: granted, and what they grow by
+// at the chosen rank.
 layout(local_size_x = 256) in;
 #include "allocation/state.glsl"
 #include "allocation/bins.glsl"
@@ -7,6 +8,7 @@ layout(local_size_x = 256) in;
 #include "allocation/cut.glsl"
 
 layout(std430, binding = 3) writeonly buffer Blocks { uvec2 sums[]; };  // [blocks]
+uniform uint pixels;
 shared uint sure, growth;
 
 void main() {
@@ -15,7 +17,10 @@ void main() {
     barrier();
     uvec2 own = uvec2(0u);
     for (uint i = 0u; i < uint(BLOCK) / 256u; ++i) {
-        Cut cut = cut_of(block * uint(BLOCK) + i * 256u + lane);
+        uint p = block * uint(BLOCK) + i * 256u + lane;
+        if (p >= pixels) continue;
+        Cut cut = cut_of(p);
+        bin_word[curve_at(0, p)] = packed_cut(cut);
         own += uvec2(cut.fragments, cut.more_fragments - cut.fragments);
     }
     atomicAdd(sure, own.x);

@@ -1,7 +1,4 @@
 // What a pixel gets: bins and fragments below the chosen rank, and with what comes at it.
-layout(std430, binding = 2) readonly buffer Curves { vec2 curve[]; };  // [P], a and b
-uniform uint pixels;
-
 struct Cut {
     uint bins, fragments;            // that are granted
     uint more_bins, more_fragments;  // with those that come at the rank itself
@@ -9,9 +6,8 @@ struct Cut {
 
 Cut cut_of(uint p) {
     Cut cut = Cut(0u, 0u, 0u, 0u);
-    if (p >= pixels) return cut;
     PixelBins bins = bins_of(p);
-    vec2 gain = complete == 1u ? vec2(0.0) : curve[p];
+    vec2 gain = complete == 1u ? vec2(0.0) : curve_of(p);
     uint before = 0u;
     bool is_open = true;
     for (int bin = 0; bin < BINS; ++bin) {
@@ -30,4 +26,13 @@ Cut cut_of(uint p) {
         }
     }
     return cut;
+}
+
+// In one word, for the pass that places it: 5 bits of bins, 10 of fragments, and as many with more.
+uint packed_cut(Cut cut) {
+    return cut.bins | cut.fragments << 5 | cut.more_bins << 15 | cut.more_fragments << 20;
+}
+
+Cut unpacked_cut(uint word) {
+    return Cut(word & 31u, word >> 5 & 1023u, word >> 15 & 31u, word >> 20 & 1023u);
 }

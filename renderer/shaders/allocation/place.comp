@@ -1,25 +1,40 @@
 #version 450
 // Where each pixel's core lies in the pool. What is left of the budget goes to the pixels that grow at the chosen rank,
-// by index, until one does not fit. The counts have served: their first word becomes the cut, the second a cursor.
+// by index; the first that does not fit takes what does.
 layout(local_size_x = 256) in;
 #include "allocation/state.glsl"
 #include "allocation/bins.glsl"
 #include "allocation/rank.glsl"
 #include "allocation/cut.glsl"
 
-layout(std430, binding = 3) readonly buffer Blocks { uvec2 sums[]; };     // [blocks], before each
-layout(std430, binding = 4) writeonly buffer Offsets { uint offset[]; };  // [P]
+layout(std430, binding = 3) readonly buffer Blocks { uvec2 sums[]; };  // [blocks], before each
+uniform uint pixels;
 const uint OWN = uint(BLOCK) / 256u;
 shared uvec2 part[256];
+
+Cut cut_at(uint p) {
+    return p < pixels ? unpacked_cut(bin_word[curve_at(0, p)]) : Cut(0u, 0u, 0u, 0u);
+}
+
+// Bins of a pixel that may grow by so many fragments and no more.
+uint bins_within(uint p, Cut cut, uint room) {
+    PixelBins counts = bins_of(p);
+    uint bins = cut.bins, taken = 0u;
+    for (uint bin = cut.bins; bin < cut.more_bins; ++bin) {
+        taken += count_in(counts, int(bin));
+        if (taken > room) break;
+        bins = bin + 1u;
+    }
+    return bins;
+}
 
 void main() {
     uint lane = gl_LocalInvocationIndex, block = gl_WorkGroupID.x;
     uint first = block * uint(BLOCK) + lane * OWN;
-    Cut cuts[OWN];
     uvec2 own = uvec2(0u);
     for (uint i = 0u; i < OWN; ++i) {
-        cuts[i] = cut_of(first + i);
-        own += uvec2(cuts[i].fragments, cuts[i].more_fragments - cuts[i].fragments);
+        Cut cut = cut_at(first + i);
+        own += uvec2(cut.fragments, cut.more_fragments - cut.fragments);
     }
     part[lane] = own;
     for (uint reach = 1u; reach < 256u; reach *= 2u) {
@@ -33,11 +48,13 @@ void main() {
     for (uint i = 0u; i < OWN; ++i) {
         uint p = first + i;
         if (p >= pixels) return;
-        uint growth = cuts[i].more_fragments - cuts[i].fragments;
-        bool grows = before.y + growth <= spare;
-        offset[p] = before.x + min(before.y, spare);
-        counts[p * uint(FOURS)] = grows ? cuts[i].more_bins : cuts[i].bins;
-        counts[p * uint(FOURS) + 1u] = before.x + min(before.y, spare);
-        before += uvec2(cuts[i].fragments, growth);
+        Cut cut = cut_at(p);
+        uint growth = cut.more_fragments - cut.fragments;
+        uint begin = before.x + min(before.y, spare), bins = cut.bins;
+        if (before.y + growth <= spare) bins = cut.more_bins;
+        else if (before.y < spare) bins = bins_within(p, cut, spare - before.y);
+        bin_word[begin_at(p)] = begin;
+        bin_word[core_at(p)] = bins << CURSOR_BITS | begin;
+        before += uvec2(cut.fragments, growth);
     }
 }

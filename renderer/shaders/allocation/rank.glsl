@@ -5,7 +5,6 @@ uint rank_of(vec2 curve, uint before, uint after) {
     precise float steps = middle - 1.0;
     precise float fallen = curve.y * steps;
     precise float price = fallen - curve.x;
-    uint bits = floatBitsToUint(price);
-    uint ordered = bits >> 31 == 1u ? 0xFFFFFFFFu - bits : bits + 0x80000000u;
-    return ordered >> uint(DROPPED_BITS);
+    precise float above = max(price - float(LEAST_PRICE), 1.0);
+    return min(floatBitsToUint(above) - 0x3F800000u >> uint(DROPPED_BITS), uint(RANKS) - 1u);
 }

@@ -4,8 +4,7 @@ layout(std430, binding = 0) buffer State {
     uint complete;   // 1 where it covers all that can be in a core: nothing is predicted or selected
     uint occupied;   // pixels with fragments
     uint fragments;  // that can be in a core
-    uint high;       // the first half of the rank that is looked for
     uint rank;       // of the price that all pixels are granted, plus 1: what grows there takes what is left
     uint spent;      // fragments below it
-    uint counted[1 << HALF_BITS];  // fragments by half a rank
+    uint counted[RANKS];  // fragments by rank
 };

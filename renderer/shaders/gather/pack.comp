@@ -1,48 +1,42 @@
 #version 450
-// What a binned tail keeps of every pixel's gathered depth bins (common/kept_bins.glsl), in their place: the means' own
-// textures are free after it.
+// What a binned tail keeps of every pixel's gathered depth bins, and the fragments of each, in their place.
 layout(local_size_x = 64) in;
-#include "common/depth_bins.glsl"
+#include "common/bin_words.glsl"
+uniform uint pixels;
 
-layout(rgba16, binding = 0) uniform image2D bins[BINS / 4];  // units / 65535
-#if MEAN_LEVELS
-layout(binding = 0) uniform sampler2D means[BINS / 4];
-#endif
-uniform int width;
-uniform int pixels;
-
-// To the nearest step, in integers: at most 510 x 16 x 65535 + whole.
+// `part / whole` in steps of 1 / levels, to the nearest. Integers throughout: a quotient of floats is only where to begin.
 uint level(uint part, uint whole, uint levels) {
-    return whole == 0u ? 0u : min((2u * levels * part + whole) / (2u * whole), levels);
+    if (whole == 0u) return 0u;
+    uint dividend = 2u * levels * part + whole, divisor = 2u * whole;
+    uint quotient = uint(float(dividend) / float(divisor));
+    if (quotient * divisor > dividend) --quotient;
+    if ((quotient + 1u) * divisor <= dividend) ++quotient;
+    return min(quotient, levels);
 }
 
 void main() {
-    int p = int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64 + int(gl_LocalInvocationIndex);
+    uint p = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + gl_LocalInvocationIndex;
     if (p >= pixels) return;
-    ivec2 xy = ivec2(p % width, p / width);
-    uint front[BINS + 1];
-    front[0] = 0u;
-    for (int i = 0; i < BINS / 4; ++i) {
-        uvec4 four = uvec4(imageLoad(bins[i], xy) * 65535.0 + 0.5);
-        for (int j = 0; j < 4; ++j) front[4 * i + j + 1] = front[4 * i + j] + four[j];
+    uint word[BINS], total = 0u, front = 0u;
+    for (int b = 0; b < BINS; ++b) {
+        word[b] = bin_word[word_at(b, p)];
+        total += units_of(word[b]);
     }
-    uint total = front[BINS];
+    if (total == 0u) return;  // all words stay zero
+    uint low = 0u;
+    for (int b = 0; b < BINS; ++b) {
+        uint own = units_of(word[b]);
+        front += own;
+        uint kept = b == BINS - 1 ? total : level(front, total, uint(SHARE_LEVELS)) << 8;
+#if MEAN_LEVELS
+        if (b < BINS - 1) kept |= level(moment_of(word[b]), own, uint(MEAN_LEVELS));
+#endif
+        if ((b & 1) == 0) low = kept;
+        else bin_word[word_at(b / 2, p)] = low | kept << 16;
+    }
     for (int i = 0; i < BINS / 4; ++i) {
-        uvec4 words = uvec4(0u);
-#if MEAN_LEVELS
-        uvec4 moved = uvec4(texelFetch(means[i], xy, 0) * 65535.0 + 0.5);
-#endif
-        for (int j = 0; j < 4; ++j) {
-            int b = 4 * i + j;
-            if (b == BINS - 1) {
-                words[j] = min(total, 65535u);
-                continue;
-            }
-            words[j] = level(front[b + 1], total, uint(SHARE_LEVELS)) << 8;
-#if MEAN_LEVELS
-            words[j] |= level(moved[j], front[b + 1] - front[b], uint(MEAN_LEVELS));
-#endif
-        }
-        imageStore(bins[i], xy, vec4(words) / 65535.0);
+        uint four = 0u;
+        for (int j = 0; j < 4; ++j) four |= count_of(word[4 * i + j]) << 8 * j;
+        bin_word[counts_at(i, p)] = four;
     }
 }

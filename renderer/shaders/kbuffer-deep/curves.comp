@@ -6,8 +6,6 @@ layout(local_size_x = 64) in;
 #include "allocation/bins.glsl"
 #include "kbuffer-deep/inputs.glsl"
 
-layout(std430, binding = 2) writeonly buffer Curves { vec2 curve[]; };  // [P], a and b
-
 uniform uint pixels;
 
 // `clamp`, and the given number for NaN, which a network that overflows can answer: clamp(NaN) may be anything. The bits
@@ -27,12 +25,10 @@ void main() {
     read_features(int(p), fragments, x);
 #if OUTPUTS == 1
     precise float fall = 1.0 / within(diaphane_predict(x), 1.0 / float(MOST_FALL), 1.0, 1.0 / float(MOST_FALL));
-    curve[p] = vec2(max(-1.5 * fall, -float(MOST_GAIN)), fall);
+    put_curve(p, vec2(max(-1.5 * fall, -float(MOST_GAIN)), fall));
 #else
     vec2 gain = diaphane_predict(x).xy;
-    curve[p] = vec2(
-        within(gain.x, -float(MOST_GAIN), float(MOST_GAIN), -float(MOST_GAIN)),
-        within(gain.y, float(LEAST_FALL), float(MOST_FALL), float(MOST_FALL))
-    );
+    float a = within(gain.x, -float(MOST_GAIN), float(MOST_GAIN), -float(MOST_GAIN));
+    put_curve(p, vec2(a, within(gain.y, float(LEAST_FALL), float(MOST_FALL), float(MOST_FALL))));
 #endif
 }

@@ -1,10 +1,9 @@
 #version 450
 // Sorts each pixel's core in the pool: by depth, then packed colour, the order of the sorted dump.
 layout(local_size_x = 64) in;
+#include "common/bin_words.glsl"
+#include "common/pool.glsl"
 
-layout(std430, binding = 0) readonly buffer Offsets { uint offset[]; };  // [P]
-layout(std430, binding = 1) readonly buffer Counts { uint counts[]; };    // [P, BINS / 4]: the second is the run's end
-layout(std430, binding = 2) buffer Pool { uvec2 fragments[]; };           // packed colour, depth bits
 uniform uint pixels;
 const uint SHORT = 24u;  // fragments that are inserted one by one; more are sorted as a heap
 
@@ -14,31 +13,36 @@ bool nearer(uvec2 one, uvec2 other) {
 
 void insert_all(uint begin, uint end) {
     for (uint i = begin + 1u; i < end; ++i) {
-        uvec2 own = fragments[i];
+        uvec2 own = slot_of(i);
         uint j = i;
-        for (; j > begin && nearer(own, fragments[j - 1u]); --j) fragments[j] = fragments[j - 1u];
-        fragments[j] = own;
+        for (; j > begin; --j) {
+            uvec2 other = slot_of(j - 1u);
+            if (!nearer(own, other)) break;
+            put_slot(j, other);
+        }
+        put_slot(j, own);
     }
 }
 
 // Let the fragment at `node` of the heap sink below those behind it.
 void sink(uint begin, uint node, uint size) {
-    uvec2 own = fragments[begin + node];
+    uvec2 own = slot_of(begin + node);
     for (uint child = 2u * node + 1u; child < size; child = 2u * node + 1u) {
-        if (child + 1u < size && nearer(fragments[begin + child], fragments[begin + child + 1u])) ++child;
-        if (!nearer(own, fragments[begin + child])) break;
-        fragments[begin + node] = fragments[begin + child];
+        if (child + 1u < size && nearer(slot_of(begin + child), slot_of(begin + child + 1u))) ++child;
+        uvec2 other = slot_of(begin + child);
+        if (!nearer(own, other)) break;
+        put_slot(begin + node, other);
         node = child;
     }
-    fragments[begin + node] = own;
+    put_slot(begin + node, own);
 }
 
 void sort_heap(uint begin, uint size) {
     for (uint node = size / 2u; node > 0u; --node) sink(begin, node - 1u, size);
     for (uint left = size - 1u; left > 0u; --left) {
-        uvec2 farthest = fragments[begin];
-        fragments[begin] = fragments[begin + left];
-        fragments[begin + left] = farthest;
+        uvec2 farthest = slot_of(begin);
+        put_slot(begin, slot_of(begin + left));
+        put_slot(begin + left, farthest);
         sink(begin, 0u, left);
     }
 }
@@ -46,7 +50,7 @@ void sort_heap(uint begin, uint size) {
 void main() {
     uint p = 64u * (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) + gl_LocalInvocationIndex;
     if (p >= pixels) return;
-    uint begin = offset[p], end = counts[p * (uint(BINS) / 4u) + 1u];
+    uint begin = run_begin(p), end = run_end(p);
     if (end - begin < 2u) return;
     if (end - begin <= SHORT) insert_all(begin, end);
     else sort_heap(begin, end - begin);

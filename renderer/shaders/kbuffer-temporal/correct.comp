@@ -5,7 +5,6 @@ layout(local_size_x = 64) in;
 #include "allocation/bins.glsl"
 #include "kbuffer-temporal/memory.glsl"
 
-layout(std430, binding = 2) buffer Curves { vec2 curve[]; };   // [P], a and b
 layout(std430, binding = 6) buffer Memory { uint memory[]; };  // [P]
 
 uniform uint pixels;
@@ -35,11 +34,11 @@ void main() {
         frames = frames_of(word);
         correction = correction_of(word);
         if (seen_k(word) > 0u && frames < uint(FRAMES)) {
-            correction = learnt(word, correction, frames, curve[p]);
+            correction = learnt(word, correction, frames, curve_of(p));
             ++frames;
         }
         if (still == 0) frames = min(frames, uint(MOVING_FRAMES));
     }
     memory[p] = remembered(correction, frames, n);
-    curve[p].x += float(correction) / float(CORRECTION_STEPS);
+    put_curve(p, curve_of(p) + vec2(float(correction) / float(CORRECTION_STEPS), 0.0));
 }

@@ -1,9 +1,6 @@
 // What the last core fragment of a pixel changes of its displayed colour: the squared difference from the composite that
 // has it in the tail. By it the next frame corrects the pixel's gain curve (correct.comp).
 layout(std430, binding = 6) buffer Memory { uint memory[]; };  // [P]
-#if STRIDE == 1
-layout(std430, binding = 1) readonly buffer Depths { uint depth[]; };
-#endif
 
 // sRGB of linear light (IEC 61966-2-1).
 vec3 displayed(vec3 linear) {
@@ -11,21 +8,13 @@ vec3 displayed(vec3 linear) {
     return mix(1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, 12.92 * c, lessThanEqual(c, vec3(0.0031308)));
 }
 
-float depth_at(uint slot) {
-#if STRIDE == 1
-    return uintBitsToFloat(depth[slot]);
-#else
-    return uintBitsToFloat(colour[STRIDE * slot + 1u]);
-#endif
-}
-
 // k core fragments, the last in `slot`, are seen as `seen`; without it the core is `core`, and it joins the tail's sums.
 void observe(int p, uint k, uint slot, vec3 seen, vec4 core, vec4 sums, vec4 opacity, vec3 behind) {
     uint word = memory[p];
     if (word == NOTHING || k > MOST_SEEN) return;
-    uint stored = colour[STRIDE * slot];
-    float a = opacity_of(stored);
-    float weight = tail_weight(p, a, depth_at(slot));
+    uvec2 fragment = slot_of(slot);
+    uint stored = fragment.x;
+    float a = opacity_of(stored), weight = tail_weight(p, a, uintBitsToFloat(fragment.y));
     sums += vec4(weight * decoded(stored), weight);
     opacity += vec4(-log(1.0 - a), a, 1.0, 0.0);
     vec3 change = displayed(seen) - displayed(composed(core, sums, opacity, behind));

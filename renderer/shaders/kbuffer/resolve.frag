@@ -1,19 +1,26 @@
 #version 450
 // Core front to back, then the tail, then the background (METHOD 2). Linear RGB out.
 // TAIL: -1 none (the pool holds every fragment), else a kind of schemas/tail.py. STRIDE: words of a slot; the first is the colour.
-// CURSOR: runs end where a cursor of so many words says. OBSERVE: also note what the last core fragment changed (kbuffer-temporal/observe.glsl).
+// RUNS: of whole bins (common/bin_words.glsl). OBSERVE: also note what the last core fragment changed (kbuffer-temporal/observe.glsl).
 #include "common/composite.glsl"
 uniform int width;
 #ifdef OBSERVE
 #include "kbuffer/tail_weight.glsl"
 #include "kbuffer-temporal/memory.glsl"
+#elif defined(RUNS)
+#include "common/bin_words.glsl"
+#endif
+#ifdef RUNS
+#include "common/pool.glsl"
+#else
+layout(std430, binding = 0) readonly buffer Offsets { uint offset[]; };  // [P+1]
+layout(std430, binding = 2) readonly buffer Colours { uint colour[]; };
+uint slot_at(uint slot) { return uint(STRIDE) * slot; }
+uint pool_word(uint at) { return colour[at]; }
+uint run_begin(uint p) { return offset[p]; }
+uint run_end(uint p) { return offset[p + 1u]; }
 #endif
 
-layout(std430, binding = 0) readonly buffer Offsets { uint offset[]; };  // [P+1]; with CURSOR [P]
-#ifdef CURSOR
-layout(std430, binding = 1) readonly buffer Cursors { uint cursor[]; };  // [P, CURSOR], the second word: where a run ends
-#endif
-layout(std430, binding = 2) readonly buffer Colours { uint colour[]; };
 layout(binding = 0) uniform sampler2D background;
 #if TAIL >= 0
 layout(binding = 1) uniform sampler2D tail_colour;
@@ -51,14 +58,9 @@ void main() {
     int p = (xy.y - first_row) * width + xy.x;
     vec4 light = vec4(0.0, 0.0, 0.0, 1.0);
     vec4 without_last = light;
-#ifdef CURSOR
-    uint end = cursor[CURSOR * p + 1];
-#else
-    uint end = offset[p + 1];
-#endif
-    uint begin = offset[p], i = begin;
+    uint begin = run_begin(uint(p)), end = run_end(uint(p)), i = begin;
     for (; i < end; ++i) {
-        uint word = colour[STRIDE * i];
+        uint word = pool_word(slot_at(i));
         if (word == EMPTY) break;  // the pixel has fewer fragments than slots
         without_last = light;
         add_behind(word, light);
@@ -69,6 +71,9 @@ void main() {
 #if TAIL >= 0
     sums = texelFetch(tail_colour, xy, 0);
     opacity = texelFetch(tail_opacity, xy, 0);
+#if TAIL == TAIL_BINNED
+    opacity *= float(MOST_OPACITY);
+#endif
 #endif
     vec3 seen = composed(light, sums, opacity, behind);
 #ifdef OBSERVE

@@ -3,7 +3,7 @@
 
 layout(location = 0) out vec4 tail_colour;  // sum w C, sum w
 #if TAIL == TAIL_BINNED
-layout(location = 1) out float tail_opacity;  // sum -ln(1-a)
+layout(location = 1) out float tail_opacity;  // sum -ln(1-a) / MOST_OPACITY
 #else
 layout(location = 1) out vec4 tail_opacity;  // sum -ln(1-a), sum a, count
 #endif
@@ -24,7 +24,7 @@ void accumulate_tail(int p, uvec4 stored, float z) {
     float weight = tail_weight(p, a, z);
     tail_colour = vec4(weight * root * root, weight);
 #if TAIL == TAIL_BINNED
-    tail_opacity = -log(1.0 - a);
+    tail_opacity = -log(1.0 - a) / float(MOST_OPACITY);
 #else
     tail_opacity = vec4(-log(1.0 - a), a, 1.0, 0.0);
 #endif

@@ -6,6 +6,7 @@ uniform sampler2D gathered;  // n, sum a, sum a^2, optical depth D
 uniform float density_g;
 #elif TAIL == TAIL_BINNED
 #include "common/depth_bins.glsl"
+#include "common/bin_words.glsl"
 #include "common/kept_bins.glsl"
 #include "common/tile_range.glsl"
 #endif
@@ -21,7 +22,7 @@ float tail_weight(int p, float a, float z) {
     weight *= exp(-min(density_g * optical_depth * x, MAX_EXPONENT));
 #elif TAIL == TAIL_BINNED
     float place = bin_place(z, range_of(ivec2(gl_FragCoord.xy), width));
-    weight *= exp(-min(in_front(kept_at(ivec2(gl_FragCoord.xy)), place, -log(1.0 - a)), MAX_EXPONENT));
+    weight *= exp(-min(in_front(uint(p), place, -log(1.0 - a)), MAX_EXPONENT));
 #endif
     return weight;
 }
