@@ -19,11 +19,12 @@ from typing import Final
 from renderer.allocation.cuts import (
     DROPPED_BITS,
     FULL,
-    HALF_BITS,
     LEAST_FALL,
+    LEAST_PRICE,
     MOST_CORE,
     MOST_FALL,
     MOST_GAIN,
+    RANKS,
 )
 from renderer.features import FEATURES, FORMULAS, SUMS, TEXELS
 from schemas.tail import (
@@ -44,8 +45,9 @@ TYPESCRIPT: Final = HOME / "web" / "src" / "generated.ts"
 CUTS: Final[dict[str, tuple[int | float, str]]] = {
     "FULL": (FULL, "What a bin's count says of this many fragments or more: such a bin is never in a core."),
     "MOST_CORE": (MOST_CORE, "Fragments of one core."),
-    "HALF_BITS": (HALF_BITS, "Of a price's rank: two counts of 2^HALF_BITS find it."),
-    "DROPPED_BITS": (DROPPED_BITS, "Lowest bits of float32 that a price's rank does without."),
+    "RANKS": (RANKS, "Of prices, as they are told apart."),
+    "LEAST_PRICE": (LEAST_PRICE, "Prices up to 1 above it are one rank."),
+    "DROPPED_BITS": (DROPPED_BITS, "Lowest bits of float32 that a price's rank does without, above LEAST_PRICE."),
     "MOST_GAIN": (MOST_GAIN, "Curves are clamped to this |a|,"),
     "LEAST_FALL": (LEAST_FALL, "to b at least this,"),
     "MOST_FALL": (MOST_FALL, "and to b at most this."),

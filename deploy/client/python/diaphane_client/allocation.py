@@ -15,15 +15,17 @@ from numpy.typing import NDArray
 from diaphane_client.constants import (
     DROPPED_BITS,
     FULL,
-    HALF_BITS,
     LEAST_FALL,
+    LEAST_PRICE,
     MOST_BINS,
     MOST_CORE,
     MOST_FALL,
     MOST_GAIN,
+    RANKS,
 )
 
-_HALVES: Final = 1 << HALF_BITS
+_BITS_OF_ONE: Final = 0x3F800000
+"""Of float32."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,8 @@ def allocate(a: NDArray[np.floating], b: NDArray[np.floating], counts: NDArray[n
     """Whole bins of predicted gain curves at the one price that uses a budget.
 
     A cut of N fragments after one of M is worth it from the price `b ((M + N) / 2 - 1) - a` on. What is left at the
-    price goes to the pixels that grow at the next one, by index, until one does not fit.
+    price goes to the pixels that grow at the next rank of prices, by index; the first that does not fit takes those of
+    its bins that do.
 
     Args:
         a: [P], log gain of the first fragment.
@@ -65,12 +68,12 @@ def allocate(a: NDArray[np.floating], b: NDArray[np.floating], counts: NDArray[n
     if growth.sum() <= F:
         return _cuts(growth, grows, complete=True)
     rank = _ranks(*_within_limits(gain, fall), growth)
-    high, left = _first_beyond(rank >> HALF_BITS, growth, F)
-    low, left = _first_beyond(rank & (_HALVES - 1), np.where(rank >> HALF_BITS == high, growth, 0), left)
-    chosen = high << HALF_BITS | low
-    more = growth * (rank == chosen)
-    fits = np.cumsum(more.sum(axis=1)) <= left
-    return _cuts(growth, grows & ((rank < chosen) | ((rank == chosen) & fits[:, None])), complete=False)
+    spent = np.cumsum(np.bincount(rank[grows], weights=growth[grows], minlength=RANKS)).astype(np.int64)
+    chosen = int(np.searchsorted(spent, F, side="right"))
+    granted, more = grows & (rank < chosen), grows & (rank == chosen)
+    # Pixel by pixel, in each bin by bin: up to the first of them that does not fit.
+    fits = np.cumsum((growth * more).ravel()) <= F - int((growth * granted).sum())
+    return _cuts(growth, granted | (more & fits.reshape(more.shape)), complete=False)
 
 
 def importance_curve(importance: NDArray[np.floating]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -96,20 +99,12 @@ def _within_limits(
 
 
 def _ranks(gain: NDArray[np.float32], fall: NDArray[np.float32], growth: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Ranks of the prices of all cuts, [P, bins]: the upper bits of float32, in their order."""
+    """Ranks of the prices of all cuts, [P, bins], from 0 to RANKS - 1: the upper bits of float32, above LEAST_PRICE."""
     after = np.cumsum(growth, axis=1)
     steps = np.float32(0.5) * (2 * after - growth).astype(np.float32) - np.float32(1.0)
     price = fall[:, None] * steps - gain[:, None]
-    bits = price.view(np.uint32).astype(np.int64)
-    return np.asarray(np.where(bits >> 31 == 1, 0xFFFFFFFF - bits, bits + 0x80000000) >> DROPPED_BITS)
-
-
-def _first_beyond(half: NDArray[np.int64], growth: NDArray[np.int64], left: int) -> tuple[int, int]:
-    """The first of the 2^HALF_BITS numbers up to which more fragments come than are left, and what is left before."""
-    counted = np.bincount(half[growth > 0], weights=growth[growth > 0], minlength=_HALVES)
-    spent = np.cumsum(counted).astype(np.int64)
-    found = int(np.searchsorted(spent, left, side="right"))
-    return found, left - (int(spent[found - 1]) if found else 0)
+    above = np.maximum(price - np.float32(LEAST_PRICE), np.float32(1.0))
+    return np.minimum(above.view(np.uint32).astype(np.int64) - _BITS_OF_ONE >> DROPPED_BITS, RANKS - 1)
 
 
 def _cuts(growth: NDArray[np.int64], granted: NDArray[np.bool_], *, complete: bool) -> Cuts:

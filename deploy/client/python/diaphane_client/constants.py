@@ -6,10 +6,12 @@ FULL: Final = 255
 """What a bin's count says of this many fragments or more: such a bin is never in a core."""
 MOST_CORE: Final = 1023
 """Fragments of one core."""
-HALF_BITS: Final = 11
-"""Of a price's rank: two counts of 2^HALF_BITS find it."""
-DROPPED_BITS: Final = 10
-"""Lowest bits of float32 that a price's rank does without."""
+RANKS: Final = 4096
+"""Of prices, as they are told apart."""
+LEAST_PRICE: Final = -8.0
+"""Prices up to 1 above it are one rank."""
+DROPPED_BITS: Final = 15
+"""Lowest bits of float32 that a price's rank does without, above LEAST_PRICE."""
 MOST_GAIN: Final = 1.152921504606847e18
 """Curves are clamped to this |a|,"""
 LEAST_FALL: Final = 0.000244140625

@@ -22,26 +22,31 @@ export const TAILS: Readonly<Record<string, Row>> = {
 export const DEFAULT_TAIL = "binned-12";
 
 /** Vectors of raw sums of a pixel. */
-export const TEXELS = 12;
+export const TEXELS = 11;
 
 /** What WGSL is compiled with; integers are those without a point. */
 export const CONSTANTS: Readonly<Record<string, string>> = {
   FULL: "255",
   MOST_CORE: "1023",
-  HALF_BITS: "11",
-  DROPPED_BITS: "10",
+  RANKS: "4096",
+  LEAST_PRICE: "-8.0",
+  DROPPED_BITS: "15",
   MOST_GAIN: "1.152921504606847e+18",
   LEAST_FALL: "0.000244140625",
   MOST_FALL: "1.152921504606847e+18",
   ROOT_SHARE: "0.6",
   PLAIN_SHARE: "0.4",
-  OPTICAL_UNIT: "951",
-  BIN_LIMIT: "65535",
+  OPTICAL_UNIT: "253",
+  BIN_LIMIT: "4095",
+  COUNT_LIMIT: "255",
   RANGE_TILE: "8",
+  MOST_OPACITY: "16.0",
   LEAST_OTHERS: "0.001",
   LEAST_SPREAD: "0.001",
-  LUMA_R: "0.2126",
-  LUMA_G: "0.7152",
-  LUMA_B: "0.0722",
+  LUMA_R: "54",
+  LUMA_G: "183",
+  LUMA_B: "19",
+  LUMA_SHIFT: "6",
+  LUMA_SQUARE_SHIFT: "14",
   MAX_EXPONENT: "60.0",
 };

@@ -5,16 +5,11 @@ import { Trouble } from "./trouble";
 export type Resource = GPUBuffer | GPUTextureView | GPUSampler;
 
 /** Limits of which all is asked for that there is; for the others the least that every device has is enough. */
-const WANTED_LIMITS = [
-  ...(["maxStorageBufferBindingSize", "maxBufferSize", "maxTextureDimension2D"] as const),
-  "maxColorAttachmentBytesPerSample",
-] as const;
+const WANTED_LIMITS = ["maxStorageBufferBindingSize", "maxBufferSize", "maxTextureDimension2D"] as const;
 
 export class Gpu {
   /** Whether float32 targets can be blended; else sums are half floats. */
   readonly blendsFloat32: boolean;
-  /** Whether a pass can blend four of them of four components each. */
-  readonly blendsManyFloat32: boolean;
   readonly #pipelines = new Map<string, GPUComputePipeline>();
 
   private constructor(
@@ -22,7 +17,6 @@ export class Gpu {
     readonly description: string,
   ) {
     this.blendsFloat32 = device.features.has("float32-blendable");
-    this.blendsManyFloat32 = this.blendsFloat32 && device.limits.maxColorAttachmentBytesPerSample >= 4 * 16;
   }
 
   /**
@@ -57,7 +51,7 @@ export class Gpu {
     return new Gpu(device, description || [vendor, architecture].filter(Boolean).join(" ") || "unknown adapter");
   }
 
-  /** What sums are blended into. */
+  /** What sums with weights beyond half floats are blended into. */
   get sumFormat(): "rgba32float" | "rgba16float" {
     return this.blendsFloat32 ? "rgba32float" : "rgba16float";
   }

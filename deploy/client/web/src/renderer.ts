@@ -150,7 +150,7 @@ export class Renderer {
   /** What was gathered for the same tail serves again. */
   async #gathered(work: Work, tail: Tail, all: boolean): Promise<Binned> {
     const before = this.#binned;
-    if (before && before.tail.name === tail.name && (!all || before.colours.length > 0)) return before;
+    if (before && before.tail.name === tail.name && (!all || before.luma)) return before;
     this.#binned = null; // what there was is overwritten
     this.#binned = await gatherBins(this.frame, work, tail, all);
     return this.#binned;

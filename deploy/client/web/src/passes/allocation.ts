@@ -9,8 +9,10 @@ import type { Binned } from "./bins";
 import type { Frame } from "./frame";
 
 /** Members of `Cuts` in cut_state.wgsl. */
-const CUT_WORDS = 6;
-const HALVES = 2 ** Number(CONSTANTS["HALF_BITS"]);
+const CUT_WORDS = 4;
+const RANKS = Number(CONSTANTS["RANKS"]);
+/** What selects cuts. */
+const CUT_FILES = ["cut_state", "bin_words", "cuts_of_counts"];
 
 /** Blocks of the pixels and of the offset behind the last one. */
 export const blocksOf = (pixels: number): number => Math.floor(pixels / BLOCK) + 1;
@@ -39,11 +41,6 @@ export class Allocation {
   /** Bins of each pixel's core. */
   get cuts(): GPUBuffer {
     return this.#frame.words("cuts", this.#frame.pixels);
-  }
-
-  /** Of a predictor: a and b of every pixel. */
-  get curves(): GPUBuffer {
-    return this.#frame.words("curves", 2 * this.#frame.pixels);
   }
 
   /** What a predictor is told of the selection. */
@@ -81,27 +78,23 @@ export class Allocation {
   }
 
   /** Finds how many fragments can be in a core, and whether a budget covers them; as `placeFixed`. */
-  begin(work: Work, { tail, counts }: Binned, budget: number): void {
+  begin(work: Work, { tail, words }: Binned, budget: number): void {
     this.#setBudget(budget);
     work.encoder.clearBuffer(this.state);
-    const files = ["cut_state", "cuts_of_counts", "core_totals"];
-    this.#run(work, files, "total_cores", [counts, this.state], this.#blocks, tail);
+    this.#run(work, [...CUT_FILES, "core_totals"], "total_cores", [words, this.state], this.#blocks, tail);
     this.#run(work, ["cut_state", "begin_cuts"], "begin_cuts", [this.state, this.#budget], 1, tail);
   }
 
   /** Selects the price that uses the budget, and lays out the pool. */
-  place(work: Work, { tail, counts }: Binned): void {
-    const counted = this.#frame.zeros(work, "prices", HALVES);
-    const [state, curves, sums] = [this.state, this.curves, this.#sums];
-    for (const half of ["high", "low"]) {
-      const files = ["cut_state", "cuts_of_counts", "count_prices"];
-      this.#run(work, files, `count_${half}`, [counts, state, curves, counted], this.#blocks, tail);
-      this.#run(work, ["cut_state", "choose"], `choose_${half}`, [state, counted, this.#budget], 1, tail);
-    }
-    const found = [counts, state, curves, this.cuts, sums];
-    this.#run(work, ["cut_state", "cuts_of_counts", "find_cuts"], "find_cuts", found, this.#blocks, tail);
+  place(work: Work, { tail, words }: Binned): void {
+    const counted = this.#frame.zeros(work, "prices", RANKS);
+    const [state, cuts, sums] = [this.state, this.cuts, this.#sums];
+    this.#run(work, [...CUT_FILES, "count_prices"], "count_prices", [words, state, counted], this.#blocks, tail);
+    this.#run(work, ["cut_state", "choose"], "choose", [state, counted, this.#budget], 1, tail);
+    this.#run(work, [...CUT_FILES, "find_cuts"], "find_cuts", [words, state, cuts, sums], this.#blocks, tail);
     this.#run(work, ["scan"], "scan", [state, sums], 1);
-    this.#run(work, ["place_cuts"], "place_cuts", [state, this.cuts, sums, this.offsets, this.#budget], this.#blocks);
+    const placed = [state, cuts, sums, this.offsets, this.#budget, words];
+    this.#run(work, [...CUT_FILES, "place_cuts"], "place_cuts", placed, this.#blocks, tail);
   }
 
   #setBudget(budget: number): void {

@@ -13,14 +13,13 @@ import type { Frame } from "./frame";
 const textOf = ({ wgsl, selfTest }: Bundle): string =>
   `${wgsl}\nalias Answer = vec${Math.max(selfTest.outputs[0]!.length, 2)}f;`;
 
-const FILES = ["cut_state", "cuts_of_counts", "bins", "kept_bins", "curves"];
+const FILES = ["cut_state", "bin_words", "cuts_of_counts", "bins", "kept_bins", "curves"];
 
-/** Predicts a and b of every occupied pixel, into the allocation's curves. */
+/** Predicts a and b of every occupied pixel, into its words. What was gathered has sums of luma. */
 export function predict(frame: Frame, work: Work, bundle: Bundle, binned: Binned, into: Allocation): void {
-  const textures = [frame.background, ...binned.colours].map((texture) => texture.createView());
-  const buffers = [binned.counts, into.state, binned.bins, frame.ranges, into.curves];
+  const read = [binned.words, into.state, frame.ranges, binned.luma!, frame.background.createView()];
   const options = { tail: bundle.tail, before: textOf(bundle) };
-  frame.forPixels(work, FILES, "predict_curves", [...buffers, ...textures], options);
+  frame.forPixels(work, FILES, "predict_curves", read, options);
 }
 
 /**

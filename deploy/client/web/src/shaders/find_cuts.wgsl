@@ -1,15 +1,15 @@
 // What every pixel gets below the chosen rank, and with what comes at it. Kept as integers: later passes need not round
 // as this one does for the budget to hold.
-@group(0) @binding(0) var<storage, read> counts: array<u32>;              // [P][FOURS]
+@group(0) @binding(0) var<storage, read> words: array<u32>;               // [P][BINS]
 @group(0) @binding(1) var<storage, read> state: Cuts;
-@group(0) @binding(2) var<storage, read> curves: array<vec2f>;            // [P], a and b
-@group(0) @binding(3) var<storage, read_write> cuts: array<u32>;          // [P], 5, 10, 5 and 10 bits
-@group(0) @binding(4) var<storage, read_write> sums: array<vec2u>;        // [blocks], granted and growth
+@group(0) @binding(2) var<storage, read_write> cuts: array<u32>;          // [P], 5, 10, 5 and 10 bits
+@group(0) @binding(3) var<storage, read_write> sums: array<vec2u>;        // [blocks], granted and growth
 var<workgroup> sure: atomic<u32>;
 var<workgroup> growth: atomic<u32>;
 
 // Bins and fragments that are granted, and the same with those that come at the rank itself.
 fn cut_of(p: u32) -> vec4u {
+    let curve = curve_of(p);
     var cut = vec4u(0u);
     var before = 0u;
     for (var bin = 0u; bin < BINS; bin++) {
@@ -22,7 +22,7 @@ fn cut_of(p: u32) -> vec4u {
         }
         var found = 0u;
         if (state.complete == 0u) {
-            found = rank_of(curves[p], before, before + own);
+            found = rank_of(curve, before, before + own);
             if (found > state.rank) {
                 break;
             }

@@ -1,21 +1,20 @@
-// One additive pass for a binned tail, and what a network reads beside it (renderer/shaders/gather/bins.frag). WebGPU
-// does not blend rgba16unorm everywhere: a word of storage has a bin's optical depth in its higher half, in whole units,
-// and the same times the position in the bin in its lower one.
-@group(2) @binding(0) var<storage, read> ranges: array<vec2f>;                // [T]
-@group(2) @binding(1) var<storage, read_write> bins: array<atomic<u32>>;      // [P][BINS]
-@group(2) @binding(2) var<storage, read_write> counts: array<atomic<u32>>;    // [P][FOURS], 8 bits a bin
+// Every fragment into its depth bin: one word, one atomic exchange; for a network, one more for its colour
+// (renderer/shaders/gather/bins.frag).
+@group(2) @binding(0) var<storage, read> ranges: array<vec2f>;             // [T]
+@group(2) @binding(1) var<storage, read_write> words: array<atomic<u32>>;  // [P][BINS]
+@group(2) @binding(2) var<storage, read_write> luma: array<atomic<u32>>;   // [P], sums of luma and of its square
 
-struct Sums {
-    @location(0) colours: vec4f,  // sum l rgb, sum l y luma: l optical depth, y place from 0 to 1
-    @location(1) squares: vec4f,  // sum l rgb^2, sum l y
-}
-
-// Both halves stop where they are full.
-fn add_to_bin(at: u32, units: u32, moved: u32) {
-    var before = atomicLoad(&bins[at]);
+// What is full stays full. What others add meanwhile makes the exchange fail, and it is tried again.
+fn add_to_bin(at: u32, units: u32, moment: u32) {
+    var before = atomicLoad(&words[at]);
     loop {
-        let sum = min(vec2u(before >> 16u, before & BIN_LIMIT) + vec2u(units, moved), vec2u(BIN_LIMIT));
-        let tried = atomicCompareExchangeWeak(&bins[at], before, (sum.x << 16u) | sum.y);
+        var sum = min(units_of(before) + units, BIN_LIMIT) << UNITS_SHIFT;
+        sum |= min(moment_of(before) + moment, BIN_LIMIT) << MOMENT_SHIFT;
+        sum |= min(fragments_of(before) + 1u, COUNT_LIMIT);
+        if (sum == before) {
+            return;
+        }
+        let tried = atomicCompareExchangeWeak(&words[at], before, sum);
         if (tried.exchanged) {
             return;
         }
@@ -23,13 +22,18 @@ fn add_to_bin(at: u32, units: u32, moved: u32) {
     }
 }
 
-// A full count stays full.
-fn count_in(p: u32, bin: u32) {
-    let at = FOURS * p + bin / 4u;
-    let shift = 8u * (bin & 3u);
-    var before = atomicLoad(&counts[at]);
-    while (((before >> shift) & FULL) < FULL) {
-        let tried = atomicCompareExchangeWeak(&counts[at], before, before + (1u << shift));
+// Whole numbers: what a network reads of colours is the same on every device, too.
+fn add_luma(p: u32, units: u32, rgb: vec3u) {
+    let own = (dot(rgb, vec3u(LUMA_R, LUMA_G, LUMA_B)) + 128u) >> 8u;
+    let first = (units * own + (1u << (LUMA_SHIFT - 1))) >> LUMA_SHIFT;
+    let second = (units * own * own + (1u << (LUMA_SQUARE_SHIFT - 1))) >> LUMA_SQUARE_SHIFT;
+    var before = atomicLoad(&luma[p]);
+    loop {
+        let sum = (min((before >> 16u) + first, 0xffffu) << 16u) | min((before & 0xffffu) + second, 0xffffu);
+        if (sum == before) {
+            return;
+        }
+        let tried = atomicCompareExchangeWeak(&luma[p], before, sum);
         if (tried.exchanged) {
             return;
         }
@@ -37,18 +41,14 @@ fn count_in(p: u32, bin: u32) {
     }
 }
 
-// The fragment's place among its pixel's bins, where it was added.
-fn gather(in: Surface, optical_depth: f32) -> f32 {
+// The fragment's units, where it was added.
+fn gather(in: Surface, stored: vec4u) -> u32 {
     let p = pixel_of(in);
     let place = bin_place(bitcast<f32>(depth_bits(in)), ranges[tile_of(p, camera.size.x)]);
     let bin = bin_of(place);
-    let units = max(1.0, floor(optical_depth * OPTICAL_UNIT + 0.5));
+    let units = max(1.0, floor(-log(1.0 - f32(stored.a) / 255.0) * OPTICAL_UNIT + 0.5));
     add_to_bin(BINS * p + bin, u32(units), u32(units * (place - f32(bin)) + 0.5));
-    return place;
-}
-
-fn optical_depth_of(stored: vec4u) -> f32 {
-    return -log(1.0 - f32(stored.a) / 255.0);
+    return u32(units);
 }
 
 // For the tail alone.
@@ -58,22 +58,15 @@ fn gather_tail(in: Surface) {
     if (is_hidden(in) || !is_transparent(stored)) {
         return;
     }
-    _ = gather(in, optical_depth_of(stored));
+    _ = gather(in, stored);
 }
 
 // For a network as well.
 @fragment
-fn gather_all(in: Surface) -> Sums {
+fn gather_all(in: Surface) {
     let stored = stored_surface(in);
     if (is_hidden(in) || !is_transparent(stored)) {
-        discard;
-        return Sums();
+        return;
     }
-    let optical_depth = optical_depth_of(stored);
-    let place = gather(in, optical_depth);
-    count_in(pixel_of(in), bin_of(place));
-    let rgb = vec3f(stored.rgb) / 255.0;
-    let y = place / f32(BINS);
-    let luma = dot(rgb, vec3f(LUMA_R, LUMA_G, LUMA_B));
-    return Sums(optical_depth * vec4f(rgb, y * luma), optical_depth * vec4f(rgb * rgb, y));
+    add_luma(pixel_of(in), gather(in, stored), stored.rgb);
 }

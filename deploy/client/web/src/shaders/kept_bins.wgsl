@@ -1,6 +1,11 @@
-// What the kept bins say of a fragment (renderer/shaders/common/kept_bins.glsl). `bins`, [P][BINS], is declared before.
+// What is kept of a pixel's depth bins, 16 bits each, two a word, and what it says of a fragment
+// (renderer/shaders/common/kept_bins.glsl). `words`, [P][BINS], is declared before.
+fn kept_word(p: u32, bin: u32) -> u32 {
+    return (words[BINS * p + bin / 2u] >> (16u * (bin & 1u))) & 0xffffu;
+}
+
 fn optical_depth_at(p: u32) -> f32 {
-    return f32(bins[BINS * p + BINS - 1u]) / OPTICAL_UNIT;
+    return f32(kept_word(p, BINS - 1u)) / OPTICAL_UNIT;
 }
 
 // Of a bin's word: the share of D in front of the next bin.

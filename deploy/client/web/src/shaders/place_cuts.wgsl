@@ -1,12 +1,28 @@
 // Where each pixel's core begins in the pool. What is left of the budget goes to the pixels that grow at the chosen rank,
-// by index, until one does not fit (renderer/shaders/allocation/place.comp). No run reaches beyond the budget.
+// by index; the first that does not fit takes what does (renderer/shaders/allocation/place.comp). No run reaches beyond the
+// budget.
 @group(0) @binding(0) var<storage, read> total: array<u32>;            // the last one: fragments granted
 @group(0) @binding(1) var<storage, read_write> cuts: array<u32>;       // [P], as they were found; then bins of the core
 @group(0) @binding(2) var<storage, read> sums: array<vec2u>;           // [blocks], before each
 @group(0) @binding(3) var<storage, read_write> offsets: array<u32>;    // [P + 1]
 @group(0) @binding(4) var<uniform> budget: u32;
+@group(0) @binding(5) var<storage, read> words: array<u32>;            // [P][BINS]
 const OWN = BLOCK / 256u;
 var<workgroup> part: array<vec2u, 256>;
+
+// Bins of a pixel that may grow by so many fragments and no more.
+fn bins_within(p: u32, cut: u32, room: u32) -> u32 {
+    var bins = cut & 31u;
+    var taken = 0u;
+    for (var bin = bins; bin < ((cut >> 15u) & 31u); bin++) {
+        taken += count_of(p, bin);
+        if (taken > room) {
+            break;
+        }
+        bins = bin + 1u;
+    }
+    return bins;
+}
 
 @compute @workgroup_size(256)
 fn place_cuts(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
@@ -39,7 +55,13 @@ fn place_cuts(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
         let granted = (here[i] >> 5u) & 0x3ffu;
         let growth = (here[i] >> 20u) - granted;
         if (first + i < arrayLength(&cuts)) {
-            cuts[first + i] = select(here[i], here[i] >> 15u, before.y + growth <= spare) & 31u;
+            var bins = here[i] & 31u;
+            if (before.y + growth <= spare) {
+                bins = (here[i] >> 15u) & 31u;
+            } else if (before.y < spare) {
+                bins = bins_within(first + i, here[i], spare - before.y);
+            }
+            cuts[first + i] = bins;
         }
         before += vec2u(granted, growth);
     }

@@ -1,5 +1,5 @@
 // A fragment's part of the tail's sums, weighed by what the depth bins know to be in front of it
-// (renderer/shaders/kbuffer/tail.glsl). `bins` and `ranges` are declared before.
+// (renderer/shaders/kbuffer/tail.glsl). `words` and `ranges` are declared before.
 struct Tail {
     @location(0) colours: vec4f,  // sum w C, sum w
     @location(1) depth: f32,      // sum -ln(1 - a)
@@ -11,11 +11,11 @@ fn in_front(p: u32, place: f32, own: f32) -> f32 {
     let bin = bin_of(place);
     let total = optical_depth_at(p);
     let s = place - f32(bin);
-    let word = bins[BINS * p + bin];
+    let word = kept_word(p, bin);
     let is_last = bin == BINS - 1u;
     var before = 0.0;
     if (bin > 0u) {
-        before = total * share_behind(bins[BINS * p + bin - 1u]);
+        before = total * share_behind(kept_word(p, bin - 1u));
     }
     let within = select(total * share_behind(word), total, is_last) - before;
     let others = max(within - own, 0.0);
