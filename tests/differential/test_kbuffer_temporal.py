@@ -63,9 +63,7 @@ def fragments_of(dump: FragmentDump, share: float) -> int:
 
 def counts_of(frame: Frame) -> NDArray[np.uint8]:
     """uint8 [P, B], fragments of the bins."""
-    counts = frame.gather_bins(DEFAULT_TAIL, counts=True).counts
-    assert counts is not None
-    return np.frombuffer(counts.read(), dtype=np.uint8).reshape(frame.pixels, -1)
+    return frame.kept_bins(DEFAULT_TAIL).counts()
 
 
 @pytest.mark.parametrize("tail", BINNED_TAILS)
