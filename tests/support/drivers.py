@@ -14,8 +14,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from renderer.capture import capture
 from renderer.context import describe, gl_context
 from renderer.frame import Frame
