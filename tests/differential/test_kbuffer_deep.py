@@ -29,7 +29,7 @@ from trainer.weights import Weights
 FEW = ("log_n", "optical_depth", "front_3", "mean_2", "depth_extent")
 """Features that read no colours."""
 SHARES = [0.02, 0.3, 0.9]
-HALF_SUMS = 1e-3
+HALF_SUMS = 2e-3
 """What half-float sums of a dozen fragments may change of a picture; `FLOAT_SUMS` says what is left without them."""
 FLOAT_SUMS = 1e-5
 

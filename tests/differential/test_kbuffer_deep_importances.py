@@ -41,10 +41,10 @@ class Given(KBufferDeep):
         self._texts = {"bundle/predict.glsl": NETWORK}
         self._importance = importance
 
-    def _curves(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> moderngl.Buffer:
+    def _predict_curves(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> None:
         given = frame.ctx.buffer(self._importance)  # bound for as long as it is held
         given.bind_to_storage_buffer(_GIVEN)
-        return super()._curves(frame, binned, allocation)
+        super()._predict_curves(frame, binned, allocation)
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,7 @@ from labeller.curves import UNREACHABLE, error_curves, whole_bins
 from labeller.reference import depth_bins
 from labeller.reference import pixel_of as plain_pixel
 from labeller.shards import read_shard
-from renderer.features import FEATURES, reads_colours
+from renderer.features import FEATURES, reads_luma
 from renderer.tile_range import tile_ranges
 from schemas.fragments import FragmentDump
 from schemas.tail import BINNED_TAILS, TAILS, TailName
@@ -87,7 +87,7 @@ def test_every_size_is_trained_for_every_tail() -> None:
     every = variants()
     assert len(every) == 3 * len(BINNED_TAILS)
     assert len({(variant.tail, variant.config.decisive) for variant in every.values()}) == len(every)
-    assert not reads_colours(every["tiny, binned-12"].config.features)
+    assert not reads_luma(every["tiny, binned-12"].config.features)
 
 
 def test_budgets_leave_something_to_decide() -> None:
