@@ -136,7 +136,7 @@ def depth_bins(pixel: Pixel, optical: NDArray[np.float64], tail: Tail) -> DepthB
         if tail.mean_levels:
             mean[b] = _kept(moments[b], filled[b], tail.mean_levels) if filled[b] else 0.0
     shares = [_kept(f, front[-1], tail.share_levels) if front[-1] else 0.0 for f in front]
-    return DepthBins(place, bin_, np.array(shares), mean, min(front[-1], BIN_LIMIT))
+    return DepthBins(place, bin_, np.array(shares), mean, front[-1])
 
 
 def _kept(part: int, whole: int, levels: int) -> float:

@@ -81,6 +81,10 @@ class Binned:
         words[:, first], words[:, first + 1] = begin, cut << np.uint32(CURSOR_BITS) | begin
         self.words.write(words)
 
+    def kept(self) -> NDArray[np.uint16]:
+        """uint16 [P, BINS], what is kept of the bins (`shaders/common/kept_bins.glsl`), read back."""
+        return np.ascontiguousarray(self.read()[:, : self.tail.bins // 2]).view(np.uint16)
+
     def counts(self) -> NDArray[np.uint8]:
         """uint8 [P, BINS], fragments of each packed bin, `COUNT_LIMIT` for that many or more, read back."""
         first = self.tail.bins // 2
@@ -89,7 +93,8 @@ class Binned:
     def core_sizes(self) -> NDArray[np.int32]:
         """int32 [P], fragments of each pixel's core, read back once all is captured."""
         begin, core = self.read()[:, self.tail.bins // 2 :][:, :CORE_WORDS].T
-        return ((core & (1 << CURSOR_BITS) - 1).astype(np.int64) - begin).astype(np.int32)
+        ends = (core & (1 << CURSOR_BITS) - 1).astype(np.int64)
+        return np.asarray(ends - begin, dtype=np.int32)
 
 
 def word_defines(tail: Tail, luma: bool) -> Defines:

@@ -114,7 +114,7 @@ def keep_bins(
         kept: Gets the result.
 
     Returns:
-        The optical depth as it is kept: whole units, at most BIN_LIMIT.
+        The optical depth as it is kept: whole units, at most BIN_LIMIT a bin.
     """
     bins, front, mean = form.bins, kept.front, kept.mean
     front[: bins + 1] = 0.0
@@ -135,7 +135,7 @@ def keep_bins(
     total = front[bins]
     for b in range(bins + 1):
         front[b] = nearest_level(front[b], total, form.share_levels) if total > 0.0 else 0.0
-    return float(min(total, BIN_LIMIT))
+    return float(total)
 
 
 @njit(inline="always")

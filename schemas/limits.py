@@ -20,7 +20,7 @@ class Limits:
     buffer_bytes: int = 128 * 1024 * 1024
     """Bytes of one shader storage buffer: what llvmpipe advertises; larger captures go in bands of rows."""
     words_bytes: int = 2**31
-    """Bytes of the one buffer that holds every pixel's words: what graphics cards' drivers take at least. Software drivers
+    """Bytes of the one buffer that holds every pixel's words: what graphics cards' drivers take. Software drivers
     advertise less, and take it, too."""
     budget: float = 4096.0
     """Fragments of a frame as a multiple of width * height."""

@@ -6,7 +6,7 @@ from typing import Any, Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from renderer.features import FEATURES, reads_colours
+from renderer.features import FEATURES, reads_luma
 from schemas.network import NetworkSize
 from trainer.dataset import GROUP
 
@@ -20,12 +20,12 @@ PRESETS: Final[dict[Preset, dict[str, Any]]] = {
 """Settings of each preset that differ from the defaults; what else a preset decides is in `trainer.heads`."""
 
 SIZES: Final[dict[NetworkSize, dict[str, Any]]] = {
-    "tiny": {"hidden": (16, 8), "features": tuple(name for name in FEATURES if not reads_colours([name]))},
+    "tiny": {"hidden": (16, 8), "features": tuple(name for name in FEATURES if not reads_luma([name]))},
     "small": {},
     "full": {"hidden": (64, 32), "steps": 4000},
 }
 """Settings of each size that differ from the defaults; `benchmarks.predictors` measures them. `tiny` reads the depth
-bins and what a frame has anyway, so that no colours are gathered."""
+bins and what a frame has anyway, so that no luma is gathered."""
 
 
 class TrainConfig(BaseModel):

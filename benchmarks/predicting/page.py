@@ -17,7 +17,7 @@ Found = Mapping[str, Any]
 
 _PLOTS: Final = {
     "multiply-adds": ("multiply-adds a pixel", "multiply_adds"),
-    "bytes": ("bytes a pixel while gathering", "gather_bytes"),
+    "bytes": ("bytes a pixel beside the pool", "early_bytes"),
 }
 """What scores are drawn against: end of the file's name -> title and cost."""
 
@@ -112,7 +112,7 @@ def _size(name: str, row: Found, is_on_front: bool) -> tuple[str, ...]:
         f"**{name}**" if is_on_front else name,
         _number(score(row["q"])),
         f"{row['worse']} of {row['cells']}",
-        *(f"{value:,}" for value in (cost.weights, cost.multiply_adds, cost.gather_bytes, cost.capture_bytes)),
+        *(f"{value:,}" for value in (cost.weights, cost.multiply_adds, cost.early_bytes, cost.free_slots)),
         f"{cost.peak_bytes(1.0):g}",
         _worst(row["worst"]),
     )

@@ -105,7 +105,7 @@ def rank_of(price: NDArray[np.float32]) -> NDArray[np.int64]:
     """Ranks of prices: whole numbers that do not fall as prices rise, 0 to RANKS - 1."""
     above = np.maximum(np.asarray(price, dtype=np.float32) - np.float32(LEAST_PRICE), np.float32(1.0))
     bits = np.ascontiguousarray(above).view(np.uint32).astype(np.int64)
-    return np.minimum(bits - _BITS_OF_ONE >> DROPPED_BITS, RANKS - 1)
+    return np.asarray(np.minimum(bits - _BITS_OF_ONE >> DROPPED_BITS, RANKS - 1))
 
 
 def usable_counts(counts: NDArray[np.integer]) -> NDArray[np.int64]:

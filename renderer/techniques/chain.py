@@ -243,8 +243,8 @@ def _draw_with_tail(frame: Frame, fragment: str, tail: TailInputs) -> list[moder
 def tail_targets(frame: Frame, tail: TailInputs) -> list[moderngl.Texture]:
     """Targets for a tail's sums, zero: weighted colour and weight, and its opacity; none without a tail.
 
-    Behind bins, they are half floats and 16-bit whole numbers: half of the bytes, for less than a hundredth more error in
-    all but clouds of thousands of cards.
+    Behind bins, they are half floats and 16-bit whole numbers: half of the bytes, for less than a hundredth more error
+    in all but clouds of thousands of cards.
     """
     if tail.tail is None:
         return []

@@ -150,16 +150,7 @@ BOUNDS: Final[dict[str, Bound]] = {
         3e-6,
         "relative",
         1.0,
-        "All features but the spreads, in float32 as in a shader, against float64 from the fragments on. The "
-        "covariance is a difference of numbers up to 1, or 5 where bins are full, so it is right absolutely, not "
-        "relatively.",
-    ),
-    "features.place": Bound(
-        5e-7,
-        "relative",
-        1e-12,
-        "Sums of places along the tile's range: each has five roundings to float32, so that it is the same in shaders. "
-        "The floor is above the root of the least float32.",
+        "All features but the spread, in float32 as in a shader, against float64 from the fragments on.",
     ),
     "features.spread": Bound(
         1e-5,

@@ -23,8 +23,6 @@ SPREADS: Final = [i for i, name in enumerate(FEATURES) if "_std" in name]
 """Columns of the standard deviations."""
 FRONTS: Final = [FEATURES.index(name) for name in KEPT]
 """Columns of what is kept of the depth bins."""
-PLACED: Final = ("sum_l_y", "sum_l_y_luma")
-"""Sums of places along the tile's range."""
 _OTHERS: Final = [i for i in range(len(FEATURES)) if i not in SPREADS + FRONTS]
 
 
@@ -37,8 +35,7 @@ def run(options: Options) -> Iterator[Finding]:
         sums, sums_truth = gather(case.dump, EVERY), sums64(case.dump, EVERY)
         features, truth = derive(sums), features64(sums_truth)
         for path, found, expected, every, names in (
-            ("features.gather", sums, sums_truth, SUMS, [name for name in SUMS if name not in PLACED]),
-            ("features.place", sums, sums_truth, SUMS, PLACED),
+            ("features.gather", sums, sums_truth, SUMS, SUMS),
             ("features.derive", features, truth, FEATURES, [FEATURES[i] for i in _OTHERS]),
             ("features.spread", features, truth, FEATURES, [FEATURES[i] for i in SPREADS]),
         ):

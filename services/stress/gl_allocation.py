@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from renderer.allocation.cuts import Cuts, events_of, solve_cuts, within_limits
 from renderer.allocation.gpu import BLOCK, FrameAllocation
-from renderer.bin_pass import Binned
+from renderer.bin_pass import CORE_WORDS, CURSOR_BITS, Binned
 from renderer.programs import Programs
 from schemas.tail import BINNED_TAILS, TAILS, TailName
 from services.stress.allocations import edge_budgets
@@ -56,11 +56,35 @@ def _placed(
     truth: Cuts,
 ) -> NDArray[np.float64]:
     """float64 [P, 2], the cut of every pixel, and the fragments of the true one that its run has no room for."""
-    binned = Binned(tail, TAILS[tail], [], ctx.buffer(reserve=8), ctx.buffer(np.ascontiguousarray(counts)), [])
+    binned = packed_bins(ctx, tail, counts, curves)
     allocation = FrameAllocation(ctx, programs, binned, len(counts), budget)
     allocation.begin()
-    offsets = np.frombuffer(allocation.place(ctx.buffer(curves)).read(), dtype=np.uint32)
-    assert binned.counts is not None, "they are given"
-    words = np.frombuffer(binned.counts.read(), dtype=np.uint32).reshape(len(counts), -1)
-    room = np.diff(offsets.astype(np.int64), append=budget)
-    return np.stack([words[:, 0], np.maximum(truth.k - room, 0)], axis=1).astype(np.float64)
+    allocation.place()
+    begin, cut, _ = placed_cores(binned)
+    room = np.diff(begin, append=budget)
+    return np.stack([cut, np.maximum(truth.k - room, 0)], axis=1).astype(np.float64)
+
+
+def packed_bins(
+    ctx: moderngl.Context, tail: TailName, counts: NDArray[np.uint8], curves: NDArray[np.float32]
+) -> Binned:
+    """A pixel's words as packing and predicting leave them.
+
+    Args:
+        ctx: The context.
+        tail: A tail with bins.
+        counts: uint8 [P, B], fragments of the bins.
+        curves: float32 [P, 2], a and b.
+    """
+    bins = TAILS[tail].bins
+    words = np.zeros((len(counts), bins), dtype=np.uint32)
+    words[:, bins // 2 : bins // 2 + bins // 4] = np.ascontiguousarray(counts, dtype=np.uint8).view(np.uint32)
+    first = bins // 2 + bins // 4
+    words[:, first : first + 2] = np.ascontiguousarray(curves, dtype=np.float32).view(np.uint32)
+    return Binned(tail, TAILS[tail], ctx.buffer(words), len(counts), ctx.buffer(reserve=8))
+
+
+def placed_cores(binned: Binned) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """int64 [P] each: where a pixel's run begins, its cut, its cursor."""
+    begin, core = binned.read()[:, binned.tail.bins // 2 :][:, :CORE_WORDS].astype(np.int64).T
+    return begin, core >> CURSOR_BITS, core & (1 << CURSOR_BITS) - 1

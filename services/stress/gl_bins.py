@@ -1,4 +1,4 @@
-"""Depth bins in GLSL: the ranges of tiles, what is kept of the bins, fragments by bin, sums of colours beside them."""
+"""Depth bins in GLSL: the ranges of tiles, what is kept of the bins, fragments by bin, sums of luma beside them."""
 
 from __future__ import annotations
 
@@ -9,9 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labeller import reference
-from renderer.features import COLOUR_SUMS, SUMS
+from renderer.features import LUMA_SUMS, SUMS
 from renderer.tile_range import STEPS, tile_grid
-from schemas.tail import BINNED_TAILS, RANGE_TILE, TAILS, TailName
+from schemas.tail import (
+    BINNED_TAILS,
+    LUMA_SHIFT,
+    LUMA_SQUARE_SHIFT,
+    OPTICAL_UNIT,
+    RANGE_TILE,
+    TAILS,
+    TailName,
+)
 from services.stress.findings import Finding, compared
 from services.stress.gl_bounds import bound_of
 from services.stress.gl_capture import Geometry
@@ -26,7 +34,8 @@ _REACH = 0.0501
 """How much farther than those rays see a range may reach, relative (`range/range.frag`)."""
 _ROUNDING = 1e-5
 """Relative: what rounding, and polygons that amplify it, may move a depth by."""
-_COLOURS = [SUMS.index(name) for name in COLOUR_SUMS]
+_LUMA = [SUMS.index(name) for name in LUMA_SUMS]
+_LUMA_UNITS = np.array([2**LUMA_SHIFT / 255.0, 2**LUMA_SQUARE_SHIFT / 255.0**2]) / OPTICAL_UNIT
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,8 +135,8 @@ def _depth_bins(case: Case, p: int, tail: TailName) -> reference.DepthBins:
 
 def _bins(judge: Judge, tail: TailName) -> Iterator[Finding]:
     frame, row = judge.case.frame, TAILS[tail]
-    binned = frame.gather_bins(tail, colours=True, counts=True)
-    words = np.concatenate([_texels(texture.read(), "<u2") for texture in binned.kept], axis=1)[judge.pixels]
+    binned = frame.gather_bins(tail, luma=True)
+    words = binned.kept()[judge.pixels]
     expected = np.zeros_like(words, dtype=np.int64)
     for out, p in zip(expected, judge.pixels.tolist(), strict=True):
         kept = _depth_bins(judge.case, p, tail)
@@ -136,14 +145,9 @@ def _bins(judge: Judge, tail: TailName) -> Iterator[Finding]:
         out[-1] = kept.units
     names = [f"{tail}, bin {b}" for b in range(row.bins)]
     yield judge.row("bins.kept", words, expected, names)
-    assert binned.counts is not None, "bins are counted"
-    counts = np.frombuffer(binned.counts.read(), np.uint8).reshape(frame.pixels, -1)[judge.pixels]
+    counts = binned.counts()[judge.pixels]
     yield judge.row("bins.counts", counts, counted_bins(judge.case, judge.pixels, tail), names)
-    # As many roundings as fragments, each of what is there and of what is added.
     truth = sums64(thinned(judge.case.dump, judge.pixels), tail)[judge.pixels]
-    sums = np.concatenate([_texels(texture.read(), "<f2") for texture in binned.colours], axis=1)[judge.pixels]
-    yield judge.row("bins.colours", sums, truth[:, _COLOURS], COLOUR_SUMS, amplified=truth[:, :1] + 2.0)
-
-
-def _texels(data: bytes, dtype: str) -> NDArray[np.generic]:
-    return np.frombuffer(data, dtype=dtype).reshape(-1, 4)
+    luma = binned.read()[judge.pixels, row.bins]
+    found = np.stack([luma >> 16, luma & 0xFFFF], axis=1)
+    yield judge.row("bins.luma", found, np.rint(truth[:, _LUMA] / _LUMA_UNITS), LUMA_SUMS)

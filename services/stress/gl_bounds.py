@@ -110,30 +110,15 @@ BOUNDS: Final[dict[str, Bound]] = {
         "absolute",
         1.0,
         "Words of 16 bits in which what is kept of depth bins differs from integer arithmetic: places are rounded "
-        "operation by operation, bins add whole units and stop at 65,535.",
+        "operation by operation, bins add whole units and stop at 4,095.",
     ),
     "bins.counts": Bound(0.0, "absolute", 1.0, "Fragments by which the count of a bin, which ends at 255, is wrong."),
-    "bins.colours": Bound(
-        2.0**-10,
-        "relative",
-        1e-3,
-        "Sums in half floats, over n + 2: what is there and what is added is cut to 11 bits by each addition.",
-    ),
+    "bins.luma": Bound(0.0, "absolute", 1.0, "Sums of luma, in whole units, that differ from integer arithmetic."),
     "features": Bound(8e-6, "relative", 1.0, "Features in GLSL of n, D and the tile's range, and the background."),
+    "features.spread": Bound(
+        1e-5, "absolute", 1.0, "The standard deviation: the root of a difference, 16 times what that is wrong by."
+    ),
     "features.kept": Bound(0.0, "absolute", 1.0, "`front_b` and `mean_b`, in whole steps: what is kept as it is."),
-    "features.half": Bound(
-        3.0 * 2.0**-10,
-        "relative",
-        1.0,
-        "Features of half-float sums, over n + 2: a mean has the error of one sum, the covariance of three.",
-    ),
-    "features.half spread": Bound(
-        0.055,
-        "absolute",
-        1.0,
-        "Standard deviations of half-float sums, over `sqrt(n + 2)`: the variance has the error of `E[x^2]` and twice "
-        "that of `E[x]`, and where it should be small the root of that is all there is: `sqrt(3 x 2^-10)`.",
-    ),
     "predict.glsl": Bound(
         1e-5, "relative", 1.0, "The network in GLSL on the same float32 features: dot products of a few dozen terms."
     ),
@@ -167,22 +152,6 @@ DEEP: Final[dict[str, Bound]] = {
     ),
     "weighted-blended": _picture(1e-5, "The same; weights differ, so that roundings cancel."),
     "stochastic": _picture(1e-5, "Sums of 4096 terms."),
-    "bins.colours": Bound(
-        2e-4,
-        "relative",
-        1e-3,
-        "Half floats stall: where a sum is 1024 times what is added, nothing may be, and from 512 times on half of it "
-        "may be lost. So up to `n 2^-10 / (1 + n 2^-10) = 4/5` of a sum is lost at n = 4096, over n + 2: 1.95e-4.",
-    ),
-    "features.half": Bound(
-        1e-3,
-        "relative",
-        1.0,
-        "Features of sums of which up to 4/5 is lost: a mean is too small by that, over n + 2.",
-    ),
-    "features.half spread": Bound(
-        0.016, "absolute", 1.0, "Nothing is left of a spread but that it is at most 1, over `sqrt(n + 2)`."
-    ),
 }
 """The same for 4096 fragments a pixel, where that differs."""
 

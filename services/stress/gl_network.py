@@ -12,7 +12,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.features import FEATURES, SUMS, derive, reads_colours
+from renderer.features import FEATURES, SUMS, derive
 from renderer.techniques import KBufferDeep
 from schemas.bundle import GLSL, MANIFEST, ParityReport, Provenance, TailSpec, file_spec, load_manifest
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, DENSITY_G, TailName
@@ -29,9 +29,8 @@ from trainer.glsl_network import glsl_outputs
 from trainer.self_test import pixel_sums
 from trainer.weights import Weights
 
-_HALF: Final = [i for i, name in enumerate(FEATURES) if reads_colours([name]) and i not in SPREADS]
-"""Features of sums that are half floats."""
-_WHOLE: Final = [i for i in range(len(FEATURES)) if i not in _HALF + SPREADS + FRONTS]
+_PLAIN: Final = [i for i in range(len(FEATURES)) if i not in SPREADS + FRONTS]
+"""Features that are neither a root of a difference nor what is kept of bins."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,18 +95,12 @@ def rows(case: Case, networks: Networks, driver: str) -> Iterator[Finding]:
 def _features(
     judge: Judge, weights: Weights, technique: KBufferDeep, tail: TailName, truth: NDArray[np.float64]
 ) -> Iterator[Finding]:
-    """Features of half-float sums, of the bins and of neither; then what a network makes of them."""
+    """Features of the bins and of sums; then what a network makes of them."""
     frame, listed = judge.case.frame, judge.pixels.astype(np.uint32)
     expected, features = features64(truth), technique.features(frame, listed)
-    # As many roundings as fragments, each of what is there and of what is added.
-    amplified = judge.case.dump.counts[judge.pixels][:, None] + 2.0
-    for key, columns, times in (
-        ("features", _WHOLE, 1.0),
-        ("features.half", _HALF, amplified),
-        ("features.half spread", SPREADS, np.sqrt(amplified)),
-    ):
+    for key, columns in (("features", _PLAIN), ("features.spread", SPREADS)):
         names = [f"{tail}, {FEATURES[i]}" for i in columns]
-        yield judge.row(key, features[:, columns], expected[:, columns], names, amplified=times)
+        yield judge.row(key, features[:, columns], expected[:, columns], names)
     names = [f"{tail}, {name}" for name in KEPT]
     yield judge.row("features.kept", in_steps(features, tail), in_steps(expected, tail), names)
     yield from _outputs(judge, weights, technique.predict(frame, listed), features, expected)

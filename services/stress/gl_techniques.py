@@ -168,9 +168,7 @@ def broken_limits(
 
 def _broken_bins(case: Case, k: NDArray[np.int64], fragments: int, tail: TailName) -> dict[str, bool]:
     """The same of cores of whole bins: which they are not, or which leave more than the next bin of any pixel."""
-    counts = case.frame.gather_bins(tail, counts=True).counts
-    assert counts is not None, "bins are counted"
-    usable = whole_bins(np.frombuffer(counts.read(), np.uint8).reshape(len(k), -1))
+    usable = whole_bins(case.frame.kept_bins(tail).counts())
     before = np.cumsum(usable, axis=1) - usable
     waiting = np.where((before == k[:, None]) & (usable > 0), usable, 0)
     cores = (usable * (before < k[:, None])).sum(axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from fractions import Fraction
 
@@ -14,11 +15,11 @@ from schemas.bundle import FEATURE_LIMIT, GAIN_FLOOR
 from schemas.fragments import FragmentDump
 from schemas.tail import (
     LUMA,
+    LUMA_SHIFT,
+    LUMA_SQUARE_SHIFT,
     MAX_EXPONENT,
     MOST_BINS,
     OPTICAL_UNIT,
-    PLAIN_SHARE,
-    ROOT_SHARE,
     TAILS,
     TailKind,
     TailName,
@@ -114,26 +115,33 @@ def _sums_of(pixel: Pixel, tail: TailName) -> dict[str, float]:
     """
     row, light = TAILS[tail], -np.log(np.maximum(1.0 - pixel.alpha, 1e-3))
     kept = depth_bins(pixel, light, row)
-    x = (pixel.depth - pixel.nearest) / pixel.extent if pixel.extent > 0.0 else np.zeros(pixel.n)
-    x = np.clip(x, 0.0, 1.0)
-    y = PLAIN_SHARE * x + ROOT_SHARE * np.sqrt(x)
+    first, second = _luma_sums(pixel, light)
     found = {
         "n": float(pixel.n),
         "optical_depth": kept.units / OPTICAL_UNIT,
         "z_near": pixel.nearest,
         "z_far": pixel.nearest + pixel.extent,
-        "sum_l_y": float((light * y).sum()),
-        "sum_l_y_luma": float((light * y * (pixel.colour @ np.array(LUMA))).sum()),
+        "sum_luma": 2**LUMA_SHIFT * first / 255.0 / OPTICAL_UNIT,
+        "sum_luma2": 2**LUMA_SQUARE_SHIFT * second / 255.0**2 / OPTICAL_UNIT,
     }
     for i, c in enumerate("rgb"):
-        found[f"sum_l_{c}"] = float((light * pixel.colour[:, i]).sum())
-        found[f"sum_l_{c}2"] = float((light * pixel.colour[:, i] ** 2).sum())
         found[f"background_{c}"] = float(pixel.background[i])
     for b in range(1, row.bins):
         found[f"front_{b}"] = float(kept.front[b])
         if row.mean_levels:
             found[f"mean_{b}"] = float(kept.mean[b - 1])
     return found
+
+
+def _luma_sums(pixel: Pixel, light: NDArray[np.float64]) -> tuple[int, int]:
+    """Of a list, in plain Python: whole units times luma, and times its square, as 16 bits hold them."""
+    first = second = 0
+    for colour, own in zip(np.rint(255.0 * pixel.colour).astype(int).tolist(), light.tolist(), strict=True):
+        units = max(1, round(own * OPTICAL_UNIT)) if own > 0.0 else 0
+        luma = (sum(weight * c for weight, c in zip(LUMA, colour, strict=True)) + 128) // 256
+        first += math.floor(units * luma / 2**LUMA_SHIFT + 0.5)
+        second += math.floor(units * luma**2 / 2**LUMA_SQUARE_SHIFT + 0.5)
+    return min(first, 65535), min(second, 65535)
 
 
 def features64(sums: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -144,21 +152,15 @@ def features64(sums: NDArray[np.floating]) -> NDArray[np.float64]:
     s = {name: sums[:, i].astype(np.float64) for i, name in enumerate(SUMS)}
     used = s["n"] > 0.5
     light = np.where(used, s["optical_depth"], 1.0)
-    y, luma = s["sum_l_y"] / light, sum(LUMA[i] * s[f"sum_l_{c}"] for i, c in enumerate("rgb")) / light
+    luma = s["sum_luma"] / light
     columns = {
         "log_n": np.log2(np.where(used, s["n"], 1.0)),
         "optical_depth": np.log1p(s["optical_depth"]),
-        "depth_mean": y,
-        "luma_depth_cov": s["sum_l_y_luma"] / light - y * luma,
+        "luma_mean": luma,
+        "luma_std": np.sqrt(np.maximum(1e-3, s["sum_luma2"] / light - luma**2)),
         "depth_extent": np.log(1e-4 + (s["z_far"] - s["z_near"]) / np.maximum(1e-30, s["z_far"])),
     }
-    for c in "rgb":
-        mean = s[f"sum_l_{c}"] / light
-        columns |= {
-            f"rgb_mean_{c}": mean,
-            f"rgb_std_{c}": np.sqrt(np.maximum(1e-3, s[f"sum_l_{c}2"] / light - mean**2)),
-            f"background_{c}": s[f"background_{c}"],
-        }
+    columns |= {f"background_{c}": s[f"background_{c}"] for c in "rgb"}
     columns |= {f"{kept}_{b}": s[f"{kept}_{b}"] for kept in ("front", "mean") for b in range(1, MOST_BINS)}
     return np.where(used[:, None], np.stack([columns[name] for name in FEATURES], axis=1), 0.0)
 

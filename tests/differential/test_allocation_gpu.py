@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from renderer.allocation.cuts import FULL, HALF_BITS, MOST_CORE, events_of, solve_cuts, usable_counts, within_limits
+from renderer.allocation.cuts import FULL, MOST_CORE, RANKS, events_of, solve_cuts, usable_counts, within_limits
 from renderer.allocation.gpu import BLOCK, STATE, AllocationState, FrameAllocation
 from renderer.bin_pass import Binned
 from renderer.programs import Programs
 from schemas.tail import BINNED_TAILS, TAILS, TailName
 from services.stress.fills import gain_cases, overflow_cases
+from services.stress.gl_allocation import packed_bins, placed_cores
 
 Numbers = NDArray[np.float32]
 NAMES = [*gain_cases(np.random.default_rng(0), 1), *overflow_cases(np.random.default_rng(0), 1)]
@@ -37,21 +38,21 @@ class Bench:
     ctx: moderngl.Context
     programs: Programs
 
-    def begin(self, counts: NDArray[np.integer], budget: int, tail: TailName = "binned-8") -> FrameAllocation:
-        buffer = self.ctx.buffer(np.ascontiguousarray(counts, dtype=np.uint8))
-        binned = Binned(tail, TAILS[tail], [], self.ctx.buffer(reserve=8), buffer, [])
+    def begin(
+        self, curves: Numbers, counts: NDArray[np.integer], budget: int, tail: TailName = "binned-8"
+    ) -> tuple[FrameAllocation, Binned]:
+        binned = packed_bins(self.ctx, tail, counts.astype(np.uint8), curves)
         allocation = FrameAllocation(self.ctx, self.programs, binned, len(counts), budget)
         allocation.begin()
-        return allocation
+        return allocation, binned
 
     def place(
         self, a: Numbers, b: Numbers, counts: NDArray[np.integer], budget: int, tail: TailName = "binned-8"
     ) -> Placed:
-        allocation = self.begin(counts, budget, tail)
-        offsets = allocation.place(self.ctx.buffer(np.stack([a, b], axis=1).astype(np.float32)))
-        offset = np.frombuffer(offsets.read(), dtype=np.uint32).astype(np.int64)
-        words = np.frombuffer(allocation._buffers[1].read(), dtype=np.uint32).reshape(len(counts), -1)
-        return Placed(*words[:, :2].astype(np.int64).T, offset, allocation.read_state())
+        allocation, binned = self.begin(np.stack([a, b], axis=1), counts, budget, tail)
+        allocation.place()
+        offset, cut, cursor = placed_cores(binned)
+        return Placed(cut, cursor, offset, allocation.read_state())
 
 
 @pytest.fixture(scope="module")
@@ -159,7 +160,7 @@ def test_the_same_frame_is_placed_alike_every_time(bench: Bench) -> None:
 
 def test_a_shader_visits_every_pixel_of_more_than_one_row_of_groups(bench: Bench, ctx: moderngl.Context) -> None:
     pixels = 65535 * 64 + 1000
-    allocation = bench.begin(np.ones((pixels, 8), np.uint8), pixels)
+    allocation, _ = bench.begin(np.zeros((pixels, 2), np.float32), np.ones((pixels, 8), np.uint8), pixels)
     program = ctx.compute_shader(
         """#version 450
         layout(local_size_x = 64) in;
@@ -179,6 +180,6 @@ def test_a_shader_visits_every_pixel_of_more_than_one_row_of_groups(bench: Bench
 
 
 def test_the_state_is_laid_out_as_the_shaders_have_it() -> None:
-    assert STATE.itemsize == 4 * (7 + (1 << HALF_BITS))
+    assert STATE.itemsize == 4 * (6 + RANKS)
     assert STATE.fields is not None
-    assert [STATE.fields[name][1] for name in ("budget", "fragments", "rank", "counted")] == [0, 12, 20, 28]
+    assert [STATE.fields[name][1] for name in ("budget", "fragments", "rank", "counted")] == [0, 12, 16, 24]

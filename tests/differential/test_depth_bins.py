@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import weakref
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import moderngl
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from support.frames import float_sums
 from support.scenes import SIZE, VIEW, shells
 from support.training import export_random, random_weights
 
@@ -21,7 +19,7 @@ from renderer.allocation.cuts import FULL
 from renderer.bin_pass import Binned
 from renderer.capture import capture
 from renderer.depth_bins import OPTICAL, bin_form, keep_bins, kept_room, place_of
-from renderer.features import COLOUR_SUMS, FEATURES, SUMS, derive, gather
+from renderer.features import FEATURES, LUMA_SUMS, SUMS, derive, gather
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.programs import expand
@@ -31,13 +29,22 @@ from renderer.tile_range import pixel_ranges, tile_grid, tile_ranges
 from schemas.fragments import FragmentDump
 from schemas.limits import LIMITS
 from schemas.problem import Problem
-from schemas.tail import BINNED_TAILS, RANGE_TILE, TAILS, Tail, TailName
+from schemas.tail import (
+    BINNED_TAILS,
+    LUMA_SHIFT,
+    LUMA_SQUARE_SHIFT,
+    OPTICAL_UNIT,
+    RANGE_TILE,
+    TAILS,
+    Tail,
+    TailName,
+)
 
 SIZES = [(160, 120), (61, 45), (8, 8), (7, 5), (1, 1), (130, 3)]
 """The shared frame's, and such as are not whole tiles."""
 AWAY = VIEW.model_copy(update={"target": (VIEW.eye[0], VIEW.eye[1], 2.0 * VIEW.eye[2])})
 """A view of nothing."""
-NO_COLOURS = tuple(name for name in FEATURES if not name.startswith(("rgb_", "luma_", "depth_mean")))
+NO_LUMA = tuple(name for name in FEATURES if not name.startswith("luma_"))
 
 
 @pytest.fixture(scope="module")
@@ -47,15 +54,7 @@ def gpu(gl: moderngl.Context) -> GpuScene:
 
 def words_of(binned: Binned) -> NDArray[np.int64]:
     """int64 [P, B], what is kept of the bins."""
-    fours = [np.frombuffer(texture.read(), dtype=np.uint16).reshape(-1, 4) for texture in binned.kept]
-    return np.concatenate(fours, axis=1).astype(np.int64)
-
-
-def counts_of(binned: Binned, pixels: int) -> NDArray[np.int64]:
-    """int64 [P, B], fragments of the bins as they were counted."""
-    assert binned.counts is not None
-    read = np.frombuffer(binned.counts.read(binned.tail.bins * pixels), dtype=np.uint8)
-    return read.reshape(pixels, binned.tail.bins).astype(np.int64)
+    return binned.kept().astype(np.int64)
 
 
 def expected_words(dump: FragmentDump, tail: Tail) -> NDArray[np.int64]:
@@ -115,18 +114,16 @@ def test_what_is_kept_of_the_bins_is_what_the_dump_says(gpu: GpuScene, tail: Tai
 def test_fragments_are_counted_by_bin(gpu: GpuScene, tail: TailName, size: tuple[int, int]) -> None:
     frame = Frame(gpu, VIEW, *size)
     dump = capture(frame).dump
-    for colours in (False, True):
-        binned = frame.gather_bins(tail, colours=colours, counts=True)
-        assert np.array_equal(counts_of(binned, dump.pixels), counted(dump, TAILS[tail]))
+    for luma in (False, True):
+        binned = frame.gather_bins(tail, luma=luma)
+        assert np.array_equal(binned.counts(), counted(dump, TAILS[tail]))
         assert np.array_equal(words_of(binned), expected_words(dump, TAILS[tail])), "whatever is gathered beside them"
 
 
 @pytest.mark.parametrize("tail", BINNED_TAILS)
 def test_what_is_kept_is_the_same_from_run_to_run(gpu: GpuScene, tail: TailName) -> None:
-    first, again = (Frame(gpu, VIEW, *SIZE).gather_bins(tail, counts=True) for _ in range(2))
-    assert np.array_equal(words_of(first), words_of(again))
-    pixels = SIZE[0] * SIZE[1]
-    assert np.array_equal(counts_of(first, pixels), counts_of(again, pixels))
+    first, again = (Frame(gpu, VIEW, *SIZE).gather_bins(tail, luma=True) for _ in range(2))
+    assert np.array_equal(first.read(), again.read())
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
@@ -154,9 +151,7 @@ def test_without_a_fragment_there_are_no_ranges_and_the_picture_is_the_backgroun
     assert dump.total == 0
     assert not tile_ranges(dump).any()
     for tail in BINNED_TAILS:
-        binned = frame.gather_bins(tail, colours=True, counts=True)
-        assert not words_of(binned).any()
-        assert not counts_of(binned, dump.pixels).any()
+        assert not frame.gather_bins(tail, luma=True).read().any()
     exact = composite(dump, dump.counts).reshape(45, 61, 3)
     for name in ("binned", "kbuffer", "kbuffer-importance"):
         np.testing.assert_allclose(technique(name).render(frame, Budget(10)).linear, exact, atol=1e-6, rtol=0)
@@ -206,9 +201,10 @@ def test_with_any_ranges_the_picture_is_as_simulated(
     frame = Frame(gpu, VIEW, *size)
     monkeypatch.setattr(Frame, "_estimated_range", lambda self: self.ctx.buffer(ranges))
     dump = replace(plain, tile_range=None if given == "none" else ranges)
-    binned = frame.gather_bins(tail, counts=True)
+    binned = frame.gather_bins(tail)
     assert np.array_equal(words_of(binned), expected_words(dump, TAILS[tail]))
-    assert np.array_equal(counts_of(binned, dump.pixels), counted(dump, TAILS[tail]))
+    assert np.array_equal(binned.counts(), counted(dump, TAILS[tail]))
+    float_sums(monkeypatch)
     rendered = technique("kbuffer").render(frame, Budget(2 * dump.pixels, tail))
     simulated = composite(dump, rendered.k, tail).reshape(rendered.linear.shape)
     np.testing.assert_allclose(rendered.linear, simulated, atol=3e-6, rtol=0)
@@ -241,18 +237,16 @@ def test_places_are_the_same_to_the_bit(ctx: moderngl.Context, tail: TailName) -
 
 
 @pytest.mark.parametrize("tail", BINNED_TAILS)
-def test_sums_of_colours_are_those_of_the_dump_in_half_floats(frame: Frame, dump: FragmentDump, tail: TailName) -> None:
-    binned = frame.gather_bins(tail, colours=True)
-    expected = gather(dump, tail)[:, [SUMS.index(name) for name in COLOUR_SUMS]]
-    assert [texture.dtype for texture in binned.colours] == ["f2", "f2"]
-    halves = [np.frombuffer(texture.read(), np.float16).reshape(-1, 4) for texture in binned.colours]
-    found = np.concatenate(halves, axis=1).astype(np.float64)
-    # Each of the n additions, and what is added, is cut to 11 bits.
-    assert (np.abs(found - expected) <= (dump.counts[:, None] + 2) * np.abs(expected) * 2.0**-10 + 1e-6).all()
+def test_sums_of_luma_are_those_of_the_dump_to_the_unit(frame: Frame, dump: FragmentDump, tail: TailName) -> None:
+    words = frame.gather_bins(tail, luma=True).read()[:, TAILS[tail].bins]
+    units = np.array([2**LUMA_SHIFT / 255.0, 2**LUMA_SQUARE_SHIFT / 255.0**2]) / OPTICAL_UNIT
+    expected = gather(dump, tail)[:, [SUMS.index(name) for name in LUMA_SUMS]] / units
+    assert words.any()
+    np.testing.assert_allclose(np.stack([words >> 16, words & 0xFFFF], axis=1), expected, rtol=1e-6, atol=1e-3)
 
 
 @pytest.mark.parametrize("tail", BINNED_TAILS)
-@pytest.mark.parametrize("names", [FEATURES, NO_COLOURS], ids=["all", "no colours"])
+@pytest.mark.parametrize("names", [FEATURES, NO_LUMA], ids=["all", "no luma"])
 def test_a_network_reads_what_the_dump_says(
     frame: Frame, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, tail: TailName, names: tuple[str, ...]
 ) -> None:
@@ -260,72 +254,36 @@ def test_a_network_reads_what_the_dump_says(
     export_random(tmp_path, network, features[dump.counts > 0], gl, tail)
     deep, pixels = KBufferDeep(tmp_path), np.flatnonzero(dump.counts).astype(np.uint32)
     found, expected = deep.features(frame, pixels), features[pixels][:, network.columns]
-    reads_sums = np.array([name.startswith(("rgb_", "luma_", "depth_mean")) for name in names])
-    np.testing.assert_allclose(found[:, ~reads_sums], expected[:, ~reads_sums], rtol=1e-5, atol=1e-5)
-    # Of sums of half floats: as many roundings as there are fragments.
-    near = 2.0**-9 * (dump.counts[pixels, None] + 2)
-    spread = np.array(["_std" in name for name in names])[reads_sums]
-    one, two = found[:, reads_sums].astype(np.float64), expected[:, reads_sums].astype(np.float64)
-    apart = np.abs(np.where(spread, one**2 - two**2, one - two))
-    assert (apart <= near).all()
-
-
-def test_the_textures_that_only_gathering_needs_are_gone_after_it(
-    gpu: GpuScene, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    frame = Frame(gpu, VIEW, *SIZE)
-    made: list[weakref.ref[moderngl.Texture]] = []
-    make = frame.targets
-
-    def watched(count: int, dtype: str) -> list[moderngl.Texture]:
-        found = make(count, dtype)
-        made.extend(weakref.ref(texture) for texture in found)
-        return found
-
-    monkeypatch.setattr(frame, "targets", watched)
-    binned = frame.gather_bins("binned-12", colours=True)
-    assert len(made) == 3 + 3 + 2
-    alive = [texture() for texture in made]
-    assert alive == [*binned.kept, None, None, None, *binned.colours], "what is bound is kept, beside the pool"
-
-
-class Sizes:
-    """Bytes of all that a frame makes, by textures' and buffers' own say."""
-
-    def __init__(self, frame: Frame, patch: pytest.MonkeyPatch) -> None:
-        self.textures: list[moderngl.Texture] = []
-        self.buffers: list[moderngl.Buffer] = []
-        for name, kept in (("targets", self.textures), ("float_targets", self.textures), ("buffer", self.buffers)):
-            patch.setattr(frame, name, self._watched(getattr(frame, name), kept))
-
-    @staticmethod
-    def _watched(make: Callable[..., Any], kept: list[Any]) -> Callable[..., Any]:
-        def made(*args: object) -> Any:
-            found = make(*args)
-            kept.extend(found if isinstance(found, list) else [found])
-            return found
-
-        return made
-
-    @property
-    def bytes(self) -> int:
-        widths = {"nu2": 2, "f2": 2, "f4": 4}
-        textures = sum(t.width * t.height * t.components * widths[t.dtype] for t in self.textures)
-        return textures + sum(b.size for b in self.buffers)
+    # The root of a difference makes up to 16 times what that is wrong by.
+    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5)
 
 
 @pytest.mark.parametrize("tail", BINNED_TAILS)
-@pytest.mark.parametrize(("colours", "counts"), [(False, False), (True, False), (False, True), (True, True)])
-def test_what_gathering_says_it_needs_is_what_is_allocated(
-    gpu: GpuScene, monkeypatch: pytest.MonkeyPatch, tail: TailName, colours: bool, counts: bool
-) -> None:
-    frame = Frame(gpu, VIEW, *SIZE)
-    frame.tile_range()
-    sizes = Sizes(frame, monkeypatch)
-    binned = frame.gather_bins(tail, colours=colours, counts=counts)
-    assert binned.gathered_bytes * frame.pixels == sizes.bytes
-    kept = sum(t.width * t.height * t.components * 2 for t in [*binned.kept, *binned.colours])
-    assert binned.kept_bytes * frame.pixels == kept + (binned.counts.size if binned.counts else 0)
+@pytest.mark.parametrize("luma", [False, True])
+def test_what_a_pixel_s_words_say_they_need_is_what_is_allocated(frame: Frame, tail: TailName, luma: bool) -> None:
+    binned = frame.gather_bins(tail, luma=luma)
+    assert binned.words.size == binned.pixel_bytes * frame.pixels
+    assert binned.pixel_bytes == TAILS[tail].gathered_bytes + 4 * luma
+    needed = TAILS[tail].kept_bytes + 8 + 8 * binned.free_slots
+    assert needed <= binned.pixel_bytes < needed + 8, "what is kept, a core, and slots"
+
+
+def test_more_words_than_a_buffer_holds_are_refused(frame: Frame, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("renderer.bin_pass.LIMITS", replace(LIMITS, words_bytes=32 * frame.pixels))
+    frame.gather_bins("binned-8")
+    with pytest.raises(Problem, match="smaller picture or a tail of fewer bins"):
+        frame.gather_bins("binned-8", luma=True)
+
+
+def test_words_beyond_what_software_drivers_advertise_are_kept(gpu: GpuScene) -> None:
+    """They say 128 MiB, and hold what is bound; graphics cards say gigabytes."""
+    size = 1900, 1200
+    frame = Frame(gpu, VIEW, *size)
+    assert 4 * 16 * frame.pixels > LIMITS.buffer_bytes
+    binned = frame.gather_bins("binned-16")
+    n = frame.count()
+    assert n[-size[0] * 300 :].any()
+    assert np.array_equal(binned.counts().sum(axis=1), n)
 
 
 def test_ranges_are_an_eighth_of_a_byte_a_pixel(gpu: GpuScene) -> None:
@@ -335,23 +293,11 @@ def test_ranges_are_an_eighth_of_a_byte_a_pixel(gpu: GpuScene) -> None:
 
 @pytest.mark.parametrize("name", ["kbuffer-dynamic", "kbuffer-importance"])
 @pytest.mark.parametrize("tail", BINNED_TAILS)
-def test_the_peak_of_a_small_pool_is_the_gather_pass(
-    frame: Frame, dump: FragmentDump, name: str, tail: TailName
-) -> None:
+def test_a_pool_comes_beside_the_words(frame: Frame, dump: FragmentDump, name: str, tail: TailName) -> None:
     row = TAILS[tail]
     few = technique(name).render(frame, Budget(dump.pixels // 4, tail))
-    assert few.early_bytes == 12 + max(row.gathered_bytes, 4 if name == "kbuffer-importance" else 0)
-    assert few.pixel_bytes == 4 + 12 + row.kept_bytes + row.sum_bytes
+    assert few.early_bytes == 12 + (4 if name == "kbuffer-importance" else 0)
+    assert few.pixel_bytes == 4 + 12 + row.gathered_bytes + row.sum_bytes
     many = technique(name).render(frame, Budget(dump.total - 1, tail))
     assert many.pool_bytes > 16 * dump.pixels
     assert many.total_bytes == many.pool_bytes + many.pixel_bytes * dump.pixels > few.total_bytes
-
-
-def test_curves_beyond_a_storage_buffer_are_refused(
-    frame: Frame, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    features = derive(gather(dump, "binned-12"))[dump.counts > 0]
-    export_random(tmp_path, random_weights(11, FEATURES[:2]), features, gl)
-    monkeypatch.setattr("renderer.frame.LIMITS", replace(LIMITS, buffer_bytes=7 * dump.pixels))
-    with pytest.raises(Problem, match="above the limit"):
-        KBufferDeep(tmp_path).render(Frame(frame.gpu, VIEW, *SIZE), Budget(dump.pixels))

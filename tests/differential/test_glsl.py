@@ -69,7 +69,7 @@ def compiled(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> 
             deep.features(frame, listed)
         for tail in BINNED_TAILS:
             for colours in (False, True):
-                frame.gather_bins(tail, colours=colours, counts=True)
+                frame.gather_bins(tail, luma=colours)
         for name in TECHNIQUES:
             for tail in TAIL_NAMES if name == "kbuffer" else (DEFAULT_TAIL,):
                 technique(name, needs).render(frame, Budget(dump.total // 2, tail, chain="two-pass"))

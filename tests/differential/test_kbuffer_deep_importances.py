@@ -41,10 +41,10 @@ class Given(KBufferDeep):
         self._texts = {"bundle/predict.glsl": NETWORK}
         self._importance = importance
 
-    def _curves(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> moderngl.Buffer:
+    def _predict_curves(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> None:
         given = frame.ctx.buffer(self._importance)  # bound for as long as it is held
         given.bind_to_storage_buffer(_GIVEN)
-        return super()._curves(frame, binned, allocation)
+        super()._predict_curves(frame, binned, allocation)
 
 
 @pytest.fixture(scope="module")
@@ -76,9 +76,7 @@ def cases(rng: np.random.Generator, pixels: int) -> dict[str, NDArray[np.float32
 def test_cuts_are_those_of_the_twin(bundle: Path, frame: Frame, dump: FragmentDump, name: str) -> None:
     """From no fragment to more than there are; a reciprocal that the driver rounds otherwise moves few of them."""
     importance = cases(np.random.default_rng(3), dump.pixels)[name]
-    counts = frame.gather_bins(DEFAULT_TAIL, counts=True).counts
-    assert counts is not None
-    by_bin = np.frombuffer(counts.read(), dtype=np.uint8).reshape(dump.pixels, -1)
+    by_bin = frame.kept_bins(DEFAULT_TAIL).counts()
     deep = Given(bundle, importance)
     for fragments in (0, 1, dump.total // 10, dump.total // 3, dump.total - 1, dump.total, 2 * dump.total):
         k = deep.render(frame, Budget(fragments)).k

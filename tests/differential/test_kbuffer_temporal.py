@@ -8,6 +8,7 @@ import moderngl
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from support.frames import float_sums
 from support.scenes import SIZE, VIEW, shells
 from support.training import export_overflowing, export_random, random_weights
 
@@ -63,15 +64,19 @@ def fragments_of(dump: FragmentDump, share: float) -> int:
 
 def counts_of(frame: Frame) -> NDArray[np.uint8]:
     """uint8 [P, B], fragments of the bins."""
-    counts = frame.gather_bins(DEFAULT_TAIL, counts=True).counts
-    assert counts is not None
-    return np.frombuffer(counts.read(), dtype=np.uint8).reshape(frame.pixels, -1)
+    return frame.kept_bins(DEFAULT_TAIL).counts()
 
 
 @pytest.mark.parametrize("tail", BINNED_TAILS)
 def test_first_frame_is_that_of_kbuffer_deep_and_sees_what_last_fragments_change(
-    gpu: GpuScene, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, tail: TailName
+    gpu: GpuScene,
+    dump: FragmentDump,
+    gl: moderngl.Context,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    tail: TailName,
 ) -> None:
+    float_sums(monkeypatch)
     export_random(tmp_path, random_weights(11), derive(gather(dump, tail))[dump.counts > 0], gl, tail)
     budget, temporal = Budget(fragments_of(dump, 0.3), tail), KBufferTemporal(tmp_path)
     first = temporal.render(Frame(gpu, VIEW, *SIZE), budget)
@@ -200,7 +205,7 @@ def test_a_frame_that_fails_leaves_nothing_behind(gpu: GpuScene, bundle: Path, m
     temporal, budget = KBufferTemporal(bundle), Budget(SMALL[0] * SMALL[1])
     first = temporal.render(Frame(gpu, VIEW, *SMALL), budget)
     with monkeypatch.context() as patch:
-        patch.setattr(KBufferDeep, "_curves", lambda *_: (_ for _ in ()).throw(Problem("Full.", "Smaller.")))
+        patch.setattr(KBufferDeep, "_predict_curves", lambda *_: (_ for _ in ()).throw(Problem("Full.", "Smaller.")))
         with pytest.raises(Problem):
             temporal.render(Frame(gpu, turned(1), *SMALL), budget)
     assert np.array_equal(temporal.render(Frame(gpu, VIEW, *SMALL), budget).linear, first.linear)

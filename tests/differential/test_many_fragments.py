@@ -127,9 +127,7 @@ def test_predicted_cores_are_bins_of_fewer_than_255_and_1023_in_all__name_tail_l
     """Thousands of fragments in every bin leave a pixel to its tail, and the picture is as simulated all the same."""
     case = make_case(gl, layers)
     needs = Needs(bundle=make_bundle(case.dump, gl, tmp_path, tail))
-    counts = case.frame.gather_bins(tail, counts=True).counts
-    assert counts is not None
-    by_bin = np.frombuffer(counts.read(), dtype=np.uint8).reshape(case.frame.pixels, -1)
+    by_bin = case.frame.kept_bins(tail).counts()
     usable = usable_counts(by_bin)
     assert (by_bin == FULL).any() == (layers > FEWER_LAYERS)
     for fragments in (0, int(usable.sum()) // 3, case.dump.total - 1, 2 * case.dump.total):

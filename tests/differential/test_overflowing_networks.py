@@ -38,9 +38,7 @@ def test_its_answers_are_not_numbers_and_its_cuts_the_twins(frame: Frame, dump: 
     answers = deep.predict(frame, listed)
     assert np.isnan(answers).any()
     assert np.isinf(answers).any()
-    counts = frame.gather_bins(DEFAULT_TAIL, counts=True).counts
-    assert counts is not None
-    by_bin = np.frombuffer(counts.read(), dtype=np.uint8).reshape(dump.pixels, -1)[listed]
+    by_bin = frame.kept_bins(DEFAULT_TAIL).counts()[listed]
     for budget in budgets(dump):
         rendered = deep.render(frame, Budget(budget))
         expected = solve_cuts(events_of(*answers.T, by_bin), budget)

@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from renderer.allocation.cuts import (
     DROPPED_BITS,
     FULL,
-    LAST_RANK,
     LEAST_FALL,
+    LEAST_PRICE,
     MOST_CORE,
     MOST_FALL,
     MOST_GAIN,
+    RANKS,
     Cuts,
     events_of,
     importance_curve,
@@ -51,16 +52,17 @@ def frames(draw: st.DrawFn) -> tuple[NDArray[np.float32], NDArray[np.float32], N
 
 
 def plain_rank(a: np.float32, b: np.float32, before: int, after: int) -> int:
-    """Rank of one price, spelled out: the upper bits of the float32 number in the order of such numbers."""
+    """Rank of one price, spelled out: the upper bits of the float32 number that it is above the least price."""
     price = np.float32(b * np.float32(np.float32(0.5 * (before + after)) - np.float32(1.0))) - a
-    (bits,) = struct.unpack("<I", struct.pack("<f", price))
-    return int((0xFFFFFFFF - bits if bits >> 31 else bits + 0x80000000) >> DROPPED_BITS)
+    above = max(np.float32(price - np.float32(LEAST_PRICE)), np.float32(1.0))
+    (bits,), (one,) = (struct.unpack("<I", struct.pack("<f", number)) for number in (above, 1.0))
+    return min(int(bits - one) >> DROPPED_BITS, RANKS - 1)
 
 
 def plain_cuts(
     a: NDArray[np.float32], b: NDArray[np.float32], counts: NDArray[np.integer], budget: int
 ) -> tuple[list[int], list[int]]:
-    """Cuts and k of all pixels: events one by one, by rising rank and pixel, until a rank no longer fits as a whole."""
+    """Cuts and k of all pixels: events one by one, by rising rank, then pixel and bin, until one no longer fits."""
     gains, falls = within_limits(a, b)
     events: dict[int, list[tuple[int, int, int]]] = {}
     for p, row in enumerate(counts.tolist()):
@@ -74,16 +76,10 @@ def plain_cuts(
             before += own
     cut, k, spent = [0] * len(a), [0] * len(a), 0
     for rank in sorted(events):
-        grown = sum(own for _, _, own in events[rank])
-        fits = spent + grown <= budget
-        more = {p: sum(own for q, _, own in events[rank] if q == p) for p, _, _ in events[rank]}
-        for p in sorted(more):
-            if not fits and spent + more[p] > budget:
+        for p, bin_, own in sorted(events[rank]):
+            if spent + own > budget:
                 return cut, k
-            cut[p] = max(bin_ + 1 for q, bin_, _ in events[rank] if q == p)
-            k[p], spent = k[p] + more[p], spent + more[p]
-        if not fits:
-            return cut, k
+            cut[p], k[p], spent = bin_ + 1, k[p] + own, spent + own
     return cut, k
 
 
@@ -116,11 +112,10 @@ def test_a_budget_is_met_up_to_one_bin_of_one_pixel(
     if found.rank is None:
         assert np.array_equal(found.k, usable.sum(axis=1))
         return
-    # Some pixel's next bins, those of one price, do not fit any more.
-    rest = np.where((bins >= found.cut[:, None]) & (usable > 0), events_of(a, b, counts).rank, LAST_RANK + 1)
-    steps = np.where(rest == rest.min(axis=1, keepdims=True), usable, 0)[rest.min(axis=1) <= LAST_RANK].sum(axis=1)
-    assert len(steps) > 0
-    assert budget - found.k.sum() < steps.max()
+    # Some pixel's next bin does not fit any more.
+    waiting = np.where((bins >= found.cut[:, None]) & (usable > 0), usable, 0)
+    following = [row[row > 0][0] for row in waiting if row.any()]
+    assert budget - found.k.sum() < max(following)
 
 
 @given(frames())
@@ -139,7 +134,7 @@ def test_ranks_rise_from_bin_to_bin(a: float, b: float, row: list[int]) -> None:
     events = events_of(np.array([a]), np.array([b]), np.array([row]))
     ranks = events.rank[events.growth > 0]
     assert (np.diff(ranks) >= 0).all()
-    assert ((ranks >= 0) & (ranks <= LAST_RANK)).all()
+    assert ((ranks >= 0) & (ranks <= RANKS - 1)).all()
 
 
 @given(st.floats(width=32, allow_nan=False), st.floats(width=32, allow_nan=False))
@@ -147,8 +142,8 @@ def test_ranks_do_not_fall_as_prices_rise(one: float, other: float) -> None:
     low, high = sorted((one, other))
     ranks = rank_of(np.array([low, high], dtype=np.float32))
     assert ranks[0] <= ranks[1]
-    if high - low > 2.0**-12 * max(1.0, abs(low), abs(high)):
-        assert ranks[0] < ranks[1], "prices 2^-12 apart are told from each other"
+    if low > LEAST_PRICE + 1.0 and high < 60_000.0 and high - low > 2.0**-8 * (high - LEAST_PRICE):
+        assert ranks[0] < ranks[1], "those around 10 are told from each other if they are 1/14 apart"
 
 
 @given(st.lists(count, min_size=4, max_size=16))

@@ -14,8 +14,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from renderer.capture import capture
 from renderer.context import describe, gl_context
 from renderer.frame import Frame
@@ -61,10 +59,7 @@ def _own_facts() -> dict[str, Any]:
     dump = capture(frame).dump
     arrays = {name: getattr(dump, name) for name in ("offsets", "rgba", "depth", "background", "facing", "tile_range")}
     for tail in BINNED_TAILS:
-        binned = frame.gather_bins(tail, counts=True)
-        assert binned.counts is not None
-        arrays[f"{tail} bins"] = np.concatenate([np.frombuffer(kept.read(), np.uint16) for kept in binned.kept])
-        arrays[f"{tail} counts"] = np.frombuffer(binned.counts.read(), np.uint8)
+        arrays[f"{tail} words"] = frame.gather_bins(tail, luma=True).read()
     return {
         "driver": describe(ctx),
         "one_pass": one_pass_available(ctx),

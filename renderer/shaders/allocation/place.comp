@@ -21,9 +21,10 @@ uint bins_within(uint p, Cut cut, uint room) {
     PixelBins counts = bins_of(p);
     uint bins = cut.bins, taken = 0u;
     for (uint bin = cut.bins; bin < cut.more_bins; ++bin) {
-        taken += count_in(counts, int(bin));
+        uint own = count_in(counts, int(bin));
+        taken += own;
         if (taken > room) break;
-        bins = bin + 1u;
+        if (own > 0u) bins = bin + 1u;
     }
     return bins;
 }

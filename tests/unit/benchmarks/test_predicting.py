@@ -26,7 +26,7 @@ from labeller.curves import UNREACHABLE, error_curves, whole_bins
 from labeller.reference import depth_bins
 from labeller.reference import pixel_of as plain_pixel
 from labeller.shards import read_shard
-from renderer.features import FEATURES, reads_colours
+from renderer.features import FEATURES, reads_luma
 from renderer.tile_range import tile_ranges
 from schemas.fragments import FragmentDump
 from schemas.tail import BINNED_TAILS, TAILS, TailName
@@ -76,18 +76,18 @@ def test_costs_are_those_of_the_frame() -> None:
     lean = network_cost(random_weights(1, ("log_n", "optical_depth"), (8,)), "binned-12")
     assert (lean.weights, lean.multiply_adds) == (2 * 8 + 8 + 8 * 2 + 2, 2 * 8 + 8 * 2)
     full = network_cost(random_weights(1, FEATURES, (8,)), "binned-12")
-    assert (lean.gather_bytes, full.gather_bytes) == (60, 76)
-    assert lean.capture_bytes == full.capture_bytes == 60
+    assert (lean.early_bytes, full.early_bytes) == (58, 62)
+    assert lean.free_slots == full.free_slots == 2
     assert [full.peak_bytes(m) for m in (0.125, 1.0, 4.0)] == [76, 76, 60 + 32]
     # No means are gathered: curves, which lie beside what is kept, decide.
-    assert network_cost(random_weights(1, ("log_n",), (8,)), "density-16").gather_bytes == 32 + 16 + 8
+    assert network_cost(random_weights(1, ("log_n",), (8,)), "density-16").early_bytes == 64 + 10
 
 
 def test_every_size_is_trained_for_every_tail() -> None:
     every = variants()
     assert len(every) == 3 * len(BINNED_TAILS)
     assert len({(variant.tail, variant.config.decisive) for variant in every.values()}) == len(every)
-    assert not reads_colours(every["tiny, binned-12"].config.features)
+    assert not reads_luma(every["tiny, binned-12"].config.features)
 
 
 def test_budgets_leave_something_to_decide() -> None:

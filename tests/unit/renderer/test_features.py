@@ -12,18 +12,19 @@ from support.dumps import dump_of, random_dump
 
 import renderer
 from labeller import reference
-from renderer.features import FEATURES, SUMS, derive, features_glsl, gather, reads_colours, sums_read
+from renderer.features import FEATURES, SUMS, derive, features_glsl, gather, reads_luma, sums_read
 from schemas.fragments import FragmentDump
 from schemas.problem import Problem
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, OPTICAL_UNIT, TAILS, TailName
 
 
-def placed(dump: FragmentDump, p: int, bins: int) -> NDArray[np.float64]:
-    """Places of a pixel's fragments between the ends of its tile's range, 0 to 1, as bins see them."""
-    pixel = reference.pixel_of(dump, p)
-    x = (pixel.depth - pixel.nearest) / pixel.extent if pixel.extent > 0.0 else np.zeros(pixel.n)
-    x = np.clip(x, 0.0, 1.0)
-    return np.asarray(0.4 * x + 0.6 * np.sqrt(x))
+def luma_sums(pixel: reference.Pixel, light: NDArray[np.float64]) -> tuple[float, float]:
+    """Units times luma and times its square, each rounded to what a word counts in, as they are read."""
+    units = np.maximum(1, np.round(light * OPTICAL_UNIT)).astype(int).tolist()
+    luma = [math.floor((54 * r + 183 * g + 19 * b) / 256 + 0.5) for r, g, b in np.rint(255 * pixel.colour).astype(int)]
+    first = min(sum(math.floor(u * y / 64 + 0.5) for u, y in zip(units, luma, strict=True)), 65535)
+    second = min(sum(math.floor(u * y * y / 16384 + 0.5) for u, y in zip(units, luma, strict=True)), 65535)
+    return 64 * first / 255 / OPTICAL_UNIT, 16384 * second / 65025 / OPTICAL_UNIT
 
 
 def plain_sums(dump: FragmentDump, tail: TailName) -> NDArray[np.float64]:
@@ -31,25 +32,19 @@ def plain_sums(dump: FragmentDump, tail: TailName) -> NDArray[np.float64]:
     out, row = np.zeros((dump.pixels, len(SUMS))), TAILS[tail]
     for p in np.flatnonzero(dump.counts):
         pixel = reference.pixel_of(dump, int(p), stored=True)
-        light, y = -np.log(1.0 - pixel.alpha), placed(dump, int(p), row.bins)
-        bins = reference.depth_bins(pixel, light, row)
-        luma = pixel.colour @ np.array([0.2126, 0.7152, 0.0722])
+        light = -np.log(1.0 - pixel.alpha)
+        bins, luma = reference.depth_bins(pixel, light, row), luma_sums(pixel, light)
         values = {
             "n": pixel.n,
             "optical_depth": bins.units / OPTICAL_UNIT,
             "z_near": pixel.nearest,
             "z_far": pixel.nearest + pixel.extent,
-            "sum_l_y_luma": (light * y * luma).sum(),
-            "sum_l_y": (light * y).sum(),
+            "sum_luma": luma[0],
+            "sum_luma2": luma[1],
             **{f"front_{b}": bins.front[b] for b in range(1, row.bins)},
             **({f"mean_{b}": bins.mean[b - 1] for b in range(1, row.bins)} if row.mean_levels else {}),
         }
-        for i, c in enumerate("rgb"):
-            values |= {
-                f"sum_l_{c}": (light * pixel.colour[:, i]).sum(),
-                f"sum_l_{c}2": (light * pixel.colour[:, i] ** 2).sum(),
-                f"background_{c}": pixel.background[i],
-            }
+        values |= {f"background_{c}": pixel.background[i] for i, c in enumerate("rgb")}
         out[p] = [values.get(name, 0.0) for name in SUMS]
     return out
 
@@ -59,27 +54,21 @@ def plain_features(dump: FragmentDump, tail: TailName) -> NDArray[np.float64]:
     out, row = np.zeros((dump.pixels, len(FEATURES))), TAILS[tail]
     for p in np.flatnonzero(dump.counts):
         pixel = reference.pixel_of(dump, int(p), stored=True)
-        light, y = -np.log(1.0 - pixel.alpha), placed(dump, int(p), row.bins)
+        light = -np.log(1.0 - pixel.alpha)
         bins = reference.depth_bins(pixel, light, row)
-        optical, weight = bins.units / OPTICAL_UNIT, light / (bins.units / OPTICAL_UNIT)
-        mean, luma = weight @ pixel.colour, pixel.colour @ np.array([0.2126, 0.7152, 0.0722])
+        optical = bins.units / OPTICAL_UNIT
+        mean, square = (each / optical for each in luma_sums(pixel, light))
         far = pixel.nearest + pixel.extent
         values = {
             "log_n": math.log2(pixel.n),
             "optical_depth": math.log1p(optical),
-            "depth_mean": weight @ y,
-            "luma_depth_cov": weight @ (y * luma) - (weight @ y) * (weight @ luma),
+            "luma_mean": mean,
+            "luma_std": math.sqrt(max(0.001, square - mean**2)),
             "depth_extent": math.log(1e-4 + pixel.extent / far),
             **{f"front_{b}": bins.front[b] for b in range(1, row.bins)},
             **({f"mean_{b}": bins.mean[b - 1] for b in range(1, row.bins)} if row.mean_levels else {}),
         }
-        for i, c in enumerate("rgb"):
-            spread = weight @ pixel.colour[:, i] ** 2 - mean[i] ** 2
-            values |= {
-                f"rgb_mean_{c}": mean[i],
-                f"rgb_std_{c}": math.sqrt(max(0.001, spread)),
-                f"background_{c}": pixel.background[i],
-            }
+        values |= {f"background_{c}": pixel.background[i] for i, c in enumerate("rgb")}
         out[p] = [values.get(name, 0.0) for name in FEATURES]
     return out
 
@@ -109,7 +98,6 @@ def test_equal_depths_have_no_extent() -> None:
     rgba = np.array([[10, 20, 30, 1], [200, 100, 50, 254]], np.uint8)
     features = derive(gather(dump_of([(rgba, np.array([5.0, 5.0], np.float32))]), DEFAULT_TAIL))[0]
     named = dict(zip(FEATURES, features, strict=True))
-    assert named["depth_mean"] == named["luma_depth_cov"] == 0.0
     assert named["depth_extent"] == pytest.approx(math.log(1e-4), rel=1e-6)
 
 
@@ -138,11 +126,11 @@ def test_committed_glsl_is_the_generated_one() -> None:
 
 
 def test_a_subset_holds_only_what_is_asked_for() -> None:
-    text = features_glsl(("rgb_std_g", "log_n"))
+    text = features_glsl(("luma_std", "log_n"))
     assert "#define DIAPHANE_FEATURES 2" in text
     assert "x[0] = sqrt" in text
     assert "x[1] = log2" in text
-    assert "rgb_mean" not in text
+    assert "luma_mean" not in text
 
 
 @pytest.mark.parametrize("tail", [tail for tail in TAILS if tail not in BINNED_TAILS])
@@ -159,6 +147,6 @@ def test_an_unknown_feature_is_refused() -> None:
 def test_what_features_read_follows_from_their_formulas() -> None:
     assert sums_read(("log_n", "optical_depth")) == {"n", "optical_depth"}
     assert sums_read(("depth_extent",)) == {"z_near", "z_far"}
-    assert not reads_colours(("log_n", "background_r", "front_3", "mean_2", "depth_extent"))
-    for name in ("rgb_mean_r", "rgb_std_b", "depth_mean", "luma_depth_cov"):
-        assert reads_colours((name,))
+    assert not reads_luma(("log_n", "background_r", "front_3", "mean_2", "depth_extent"))
+    for name in ("luma_mean", "luma_std"):
+        assert reads_luma((name,))

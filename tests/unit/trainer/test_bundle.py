@@ -34,7 +34,7 @@ from trainer.bundle import Description, export_bundle, load_bundle
 from trainer.export_forms import float_forms
 from trainer.weights import Weights
 
-NAMES = ("log_n", "optical_depth", "rgb_std_g", "front_3")
+NAMES = ("log_n", "optical_depth", "luma_std", "front_3")
 DESCRIPTION = Description(
     name="glass",
     tail=TailSpec(name=DEFAULT_TAIL, g=0.75),
@@ -126,7 +126,7 @@ def test_a_tail_without_bins_is_refused(folder: Path, tail: TailName) -> None:
 def test_predict_glsl_computes_only_the_features_that_are_read(folder: Path) -> None:
     text = (folder / "predict.glsl").read_text()
     assert "#define DIAPHANE_FEATURES 4" in text
-    assert "rgb_mean" not in text
+    assert "luma_mean" not in text
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -162,7 +162,7 @@ def _set(manifest: dict[str, object], key: str, value: object) -> None:
         (lambda m: _set(m, "extra", 1), "extra"),
         (lambda m: _set(m, "head", "pickle"), "head"),
         (lambda m: m["features"][0].update(std=0.0), "std"),
-        (lambda m: m["features"][0].update(name="rgb_std_g"), "listed twice"),
+        (lambda m: m["features"][0].update(name="luma_std"), "listed twice"),
         (lambda m: m["layers"][0].update(shape=[8, 5]), "layers do not follow"),
         (lambda m: m["files"].update({"../model.onnx": m["files"]["model.onnx"]}), "the files must be"),
         (lambda m: m["files"].pop("model.onnx"), "the files must be"),

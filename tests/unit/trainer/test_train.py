@@ -125,7 +125,7 @@ def test_features_that_never_change_are_not_read(
 ) -> None:
     views = [replace(view, features=view.features.copy()) for view in data[0]]
     for view in views:
-        view.features[:, FEATURES.index("depth_mean")] = 0.33
+        view.features[:, FEATURES.index("luma_mean")] = 0.33
     weights = train(views, data[1], CONFIG.model_copy(update={"steps": 1})).weights
     assert set(result.weights.features) - set(weights.features) == {"depth_mean"}
 
