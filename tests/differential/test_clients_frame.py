@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from support.training import random_weights
 
-from renderer.bin_pass import TARGETS
 from renderer.features import derive, gather
 from renderer.frame import Frame
 from renderer.gpu_scene import TRANSPARENT
 from renderer.programs import Defines, expand
 from renderer.techniques import Binned, Budget, KBufferDeep
-from schemas.bundle import GLSL, HeadName, OutputName, ParityReport, Provenance, TailSpec
+from schemas.bundle import GLSL, HeadName, OutputName, ParityReport, Provenance, TailSpec, load_manifest
 from schemas.fragments import FragmentDump
 from schemas.tail import TailName
 from trainer.bundle import Description, write_bundle
@@ -28,9 +27,10 @@ KINDS: Defines = {
     "TAIL_BINNED": 4,
 }
 CONSTANTS: Defines = {
-    **{"TAIL": 4, **KINDS, "MAX_EXPONENT": 60.0, "ROOT_SHARE": 0.6, "PLAIN_SHARE": 0.4, "OPTICAL_UNIT": 951},
-    **{"BIN_LIMIT": 65535, "RANGE_TILE": 8, "LEAST_OTHERS": 0.001, "LEAST_SPREAD": 0.001},
-    **{"LUMA_R": 0.2126, "LUMA_G": 0.7152, "LUMA_B": 0.0722},
+    **{"TAIL": 4, **KINDS, "MAX_EXPONENT": 60.0, "ROOT_SHARE": 0.6, "PLAIN_SHARE": 0.4, "OPTICAL_UNIT": 253},
+    **{"BIN_LIMIT": 4095, "COUNT_LIMIT": 255, "RANGE_TILE": 8, "MOST_OPACITY": 16.0},
+    **{"LEAST_OTHERS": 0.001, "LEAST_SPREAD": 0.001},
+    **{"LUMA_R": 54, "LUMA_G": 183, "LUMA_B": 19, "LUMA_SHIFT": 6, "LUMA_SQUARE_SHIFT": 14},
 }
 ROWS: dict[TailName, Defines] = {
     "binned-8": {"BINS": 8, "SHARE_LEVELS": 255, "MEAN_LEVELS": 255},
@@ -38,14 +38,17 @@ ROWS: dict[TailName, Defines] = {
     "binned-16": {"BINS": 16, "SHARE_LEVELS": 255, "MEAN_LEVELS": 255},
     "density-16": {"BINS": 16, "SHARE_LEVELS": 15, "MEAN_LEVELS": 0},
 }
-ALLOCATION: Defines = {"BLOCK": 2048, "HALF_BITS": 11, "DROPPED_BITS": 10, "FULL": 255, "MOST_CORE": 1023}
+ALLOCATION: Defines = {
+    **{"BLOCK": 2048, "RANKS": 4096, "LEAST_PRICE": -8.0, "DROPPED_BITS": 15},
+    **{"FULL": 255, "MOST_CORE": 1023},
+}
 LIMITS: Defines = {
     "MOST_GAIN": 1.152921504606847e18,
     "LEAST_FALL": 0.000244140625,
     "MOST_FALL": 1.152921504606847e18,
 }
 ONES = 0xFFFFFFFF
-FOUND, RANGES = 0, 7
+STATE, FOUND, POOL, BLOCKS, BINS, RANGES = 0, 0, 2, 3, 5, 7
 
 
 class Client:
@@ -54,15 +57,17 @@ class Client:
     Args:
         frame: The view.
         tail: What is rendered.
+        luma: Whether the network reads luma.
     """
 
-    def __init__(self, frame: Frame, tail: TailName) -> None:
+    def __init__(self, frame: Frame, tail: TailName, luma: int = 0) -> None:
         self.frame, self.ctx = frame, frame.ctx
         self.width, self.height, self.pixels = frame.width, frame.height, frame.pixels
         self.texts: dict[str, str] = {}
         self.row = ROWS[tail]
-        self.tail: Defines = {**CONSTANTS, **self.row}
         self.bins = int(self.row["BINS"])
+        self.pixel_words = self.bins + luma
+        self.tail: Defines = {**CONSTANTS, **self.row, "LUMA": luma, "PIXEL_WORDS": self.pixel_words}
         self.size = {"width": self.width, "pixels": self.pixels}
         self.sixty_fours, self.blocks = -(-self.pixels // 64), -(-self.pixels // 2048)
 
@@ -95,7 +100,7 @@ class Client:
         program.run(min(groups, 1024), -(-groups // 1024))
         self.ctx.memory_barrier()
 
-    def gather(self, *, colours: bool, counts: bool) -> None:
+    def gather(self) -> None:
         """Passes 2 and 3."""
         columns, rows = -(-self.width // 8), -(-self.height // 8)
         found = self.ctx.buffer(np.tile(np.array([ONES, 0], np.uint32), columns * rows))
@@ -112,28 +117,15 @@ class Client:
         self.ctx.memory_barrier()
         self.run("range/fill.comp", {}, {0: found, 1: self.ranges}, 1, columns=columns, rows=rows)
 
-        self.kept = [self.texture(4, "nu2") for _ in range(self.bins // 4)]
-        means = [self.texture(4, "nu2") for _ in range(self.bins // 4)] if self.row["MEAN_LEVELS"] else []
-        self.sums = [self.texture(4, "f2") for _ in range(2)] if colours else []
-        self.counts = self.words(self.pixels * self.bins // 4, 0)
-        together = len(self.kept) + len(means) + len(self.sums) <= TARGETS
-        passes = [(0, [*self.kept, *means, *self.sums])] if together else [(0, [*self.kept, *means]), (1, self.sums)]
-        for alone, targets in passes:
-            own = {"ALONE": alone, "COLOURS": int(colours and (together or alone)), "COUNTS": int(counts and not alone)}
-            self.draw("gather/bins.frag", targets, {RANGES: self.ranges, 6: self.counts}, {**self.tail, **own})
-        self.frame.target([]).use()
-        for unit, texture in enumerate(self.kept):
-            texture.bind_to_image(unit, read=True, write=True)
-        for unit, texture in enumerate(means):
-            texture.use(unit)
-        self.run("gather/pack.comp", self.tail, {}, self.sixty_fours, **self.size)
+        self.found = self.words(self.pixel_words * self.pixels, 0)
+        self.inputs = {BINS: self.found, RANGES: self.ranges}
+        self.draw("gather/bins.frag", [], self.inputs, self.tail)
+        self.run("gather/pack.comp", self.tail, {BINS: self.found}, self.sixty_fours, pixels=self.pixels)
 
-    def blend(self, fragment: str, buffers: dict[int, moderngl.Buffer]) -> list[moderngl.Texture]:
+    def blend(self, fragment: str, buffers: dict[int, moderngl.Buffer], **defines: int) -> list[moderngl.Texture]:
         """Pass 4 or 7; the tail's sums."""
-        targets = [self.texture(4, "f4"), self.texture(1, "f4")]
-        for unit, texture in enumerate(self.kept, 3):
-            texture.use(unit)
-        self.draw(fragment, targets, {RANGES: self.ranges, **buffers}, self.tail)
+        targets = [self.texture(4, "f2"), self.texture(1, "nu2")]
+        self.draw(fragment, targets, {**self.inputs, **buffers}, {**self.tail, **defines})
         return targets
 
     def resolve(
@@ -158,49 +150,44 @@ class Client:
 
     def binned(self) -> np.ndarray:
         """The picture of `binned`."""
-        self.gather(colours=False, counts=False)
-        return self.resolve("common/weighted_mean.frag", self.blend("binned/tail.frag", {}), {}, {})
+        self.gather()
+        targets = self.blend("binned/tail.frag", {})
+        return self.resolve("common/weighted_mean.frag", targets, {"DEPTH_UNIT": 16.0}, {})
 
-    def deep(self, budget: int, predict: str, outputs: int, *, colours: bool) -> tuple[np.ndarray, np.ndarray]:
+    def deep(self, budget: int, predict: str, outputs: int) -> tuple[np.ndarray, np.ndarray]:
         """The picture of `kbuffer-deep`, and k of every pixel."""
         self.texts = {"bundle/predict.glsl": predict}
-        self.gather(colours=colours, counts=True)
+        self.gather()
         # 5
-        state, curves = self.words(8220 // 4, 0), self.words(2 * self.pixels, 7)
+        state, blocks = self.words(16408 // 4, 0), self.words(2 * self.blocks, 7)
         state.write(np.uint32(budget).tobytes())
-        blocks, offsets = self.words(2 * self.blocks, 7), self.words(self.pixels, 7)
-        shared = {0: state, 1: self.counts, 2: curves, 3: blocks, 4: offsets}
-        defines: Defines = {**ALLOCATION, "BINS": self.bins}
+        shared = {STATE: state, BLOCKS: blocks, BINS: self.found}
+        defines: Defines = {**self.tail, **ALLOCATION}
         numbers = {"pixels": self.pixels, "blocks": self.blocks}
 
-        def allocate(name: str, groups: int, **own: int) -> None:
-            self.run(f"allocation/{name}.comp", {**defines, **own}, shared, groups, **numbers)
+        def allocate(name: str, groups: int) -> None:
+            self.run(f"allocation/{name}.comp", defines, shared, groups, **numbers)
 
         allocate("totals", self.blocks)
-        allocate("choose", 1, STEP=0)
-        for unit, texture in enumerate([self.frame.background, *self.sums]):
-            texture.use(unit)
-        for unit, texture in enumerate(self.kept, 3):
-            texture.use(unit)
-        network: Defines = {"TEXELS": 12, "COLOURS": int(colours), "OUTPUTS": outputs, **self.tail, **defines, **LIMITS}
-        inputs = {0: state, 1: self.counts, 2: curves, RANGES: self.ranges}
-        self.run("kbuffer-deep/curves.comp", network, inputs, self.sixty_fours, **self.size)
+        allocate("complete", 1)
+        self.frame.background.use(0)
+        network: Defines = {"TEXELS": 11, "OUTPUTS": outputs, **defines, **LIMITS}
+        self.run("kbuffer-deep/curves.comp", network, {STATE: state, **self.inputs}, self.sixty_fours, **self.size)
         # 6
-        for low in (0, 1):
-            allocate("count", self.blocks, LOW=low)
-            allocate("choose", 1, STEP=1 + low)
+        allocate("count", self.blocks)
+        allocate("choose", 1)
         allocate("blocks", self.blocks)
         allocate("scan", 1)
         allocate("place", self.blocks)
         # 7, 8, 9
-        pool = self.words(2 * budget, 7)
-        targets = self.blend("kbuffer-deep/capture.frag", {1: self.counts, 2: pool})
-        buffers = {0: offsets, 1: self.counts, 2: pool}
-        self.run("kbuffer-deep/sort.comp", {"BINS": self.bins}, buffers, self.sixty_fours, pixels=self.pixels)
-        final: Defines = {**self.tail, "STRIDE": 2, "CURSOR": self.bins // 4}
-        linear = self.resolve("kbuffer/resolve.frag", targets, final, buffers)
-        ends = np.frombuffer(self.counts.read(), np.uint32).reshape(self.pixels, -1)[:, 1]
-        return linear, (ends - np.frombuffer(offsets.read(), np.uint32)).astype(np.int32)
+        in_words = int(budget <= self.pixels * ((self.pixel_words - self.bins // 2 - 2) // 2))
+        buffers = {BINS: self.found, **({} if in_words else {POOL: self.words(2 * budget, 7)})}
+        targets = self.blend("kbuffer-deep/capture.frag", buffers, IN_WORDS=in_words)
+        held: Defines = {**self.tail, "IN_WORDS": in_words}
+        self.run("kbuffer-deep/sort.comp", held, buffers, self.sixty_fours, pixels=self.pixels)
+        linear = self.resolve("kbuffer/resolve.frag", targets, {**held, "RUNS": 1}, buffers)
+        words = np.frombuffer(self.found.read(), np.uint32).reshape(self.pixels, -1)[:, self.bins // 2 :]
+        return linear, ((words[:, 1] & (2**27 - 1)).astype(np.int64) - words[:, 0]).astype(np.int32)
 
 
 @pytest.mark.parametrize("tail", ROWS)
@@ -231,10 +218,11 @@ def test_the_documents_frame_is_kbuffer_deep(
     parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, torch_ubo=0.0, driver="none")
     network = random_weights(11, head=head, outputs=outputs)
     write_bundle(tmp_path, network, described, derive(gather(dump, tail)), lambda: parity)
-    deep, client = KBufferDeep(tmp_path), Client(frame, tail)
+    luma = int(any(feature.name.startswith("luma_") for feature in load_manifest(tmp_path).features))
+    deep, client = KBufferDeep(tmp_path), Client(frame, tail, luma)
     for budget in (dump.total // 3, dump.total // 2, 100, dump.total + 5):
         expected = deep.render(frame, Budget(budget, tail))
-        linear, k = client.deep(budget, (tmp_path / GLSL).read_text(), len(outputs), colours=True)
+        linear, k = client.deep(budget, (tmp_path / GLSL).read_text(), len(outputs))
         np.testing.assert_array_equal(k, expected.k)
         assert k.sum() <= budget
         np.testing.assert_allclose(linear, expected.linear, rtol=0.0, atol=1e-6)

@@ -14,21 +14,21 @@ from renderer.allocation.gpu import BLOCK, DEFINES, STATE
 from renderer.features import TEXELS
 from renderer.programs import SHADERS, Defines, expand
 from renderer.tile_range import STEPS
-from schemas.tail import BIN_CONSTANTS, MAX_EXPONENT, TAILS, TailKind, TailName
+from schemas.tail import BIN_CONSTANTS, MAX_EXPONENT, MOST_OPACITY, TAILS, TailKind, TailName
 from trainer.export_shader import shader_source
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENT = (ROOT / "docs" / "CLIENTS.md").read_text(encoding="utf-8")
 FRAME = DOCUMENT.split("## The frame")[1].split("## What to skip")[0]
 
-ALLOCATION = ("BLOCK", "HALF_BITS", "DROPPED_BITS", "FULL", "MOST_CORE")
+ALLOCATION = ("BLOCK", "RANKS", "LEAST_PRICE", "DROPPED_BITS", "FULL", "MOST_CORE")
 LIMITS = ("MOST_GAIN", "LEAST_FALL", "MOST_FALL")
 KINDS = {f"TAIL_{kind.name}": int(kind) for kind in TailKind}
 CONSTANTS: Defines = {
     **{name: DEFINES[name] for name in (*ALLOCATION, *LIMITS)},
     **BIN_CONSTANTS,
     **KINDS,
-    **{"TAIL": int(TailKind.BINNED), "MAX_EXPONENT": MAX_EXPONENT, "TEXELS": TEXELS},
+    **{"TAIL": int(TailKind.BINNED), "MAX_EXPONENT": MAX_EXPONENT, "TEXELS": TEXELS, "DEPTH_UNIT": MOST_OPACITY},
 }
 """What the document says in numbers."""
 BINS = ("TAIL", *KINDS, *BIN_CONSTANTS)
@@ -54,26 +54,31 @@ def row(name: TailName) -> Defines:
 COMPILED: list[tuple[str, tuple[str, ...], Defines]] = [
     ("range/range.frag", (), {"STEPS": 2}),
     ("range/fill.comp", (), {}),
-    *((f"allocation/{name}.comp", ALLOCATION, {"BINS": 12}) for name in ("totals", "blocks", "scan", "place")),
-    *(("allocation/choose.comp", ALLOCATION, {"STEP": step}) for step in (0, 1, 2)),
-    *(("allocation/count.comp", ALLOCATION, {"BINS": 12, "LOW": low}) for low in (0, 1)),
-    ("kbuffer-deep/sort.comp", (), {"BINS": 12}),
-    ("common/weighted_mean.frag", (), {}),
+    ("common/weighted_mean.frag", ("DEPTH_UNIT",), {}),
 ]
 for _name in BINNED:
-    _row, _inputs = row(_name), ("TEXELS", *BINS, *ALLOCATION, *LIMITS)
+    _row, _inputs = {**row(_name), "LUMA": 0}, ("TEXELS", *BINS, *ALLOCATION, *LIMITS)
+    _row["PIXEL_WORDS"] = _row["BINS"]
+    _luma = {**_row, "LUMA": 1, "PIXEL_WORDS": int(_row["BINS"]) + 1}
     COMPILED += [
-        ("gather/bins.frag", BINS, {**_row, "ALONE": 0, "COLOURS": 0, "COUNTS": 0}),
-        ("gather/bins.frag", BINS, {**_row, "ALONE": 0, "COLOURS": 1, "COUNTS": 1}),
-        ("gather/bins.frag", BINS, {**_row, "ALONE": 1, "COLOURS": 1, "COUNTS": 0}),
+        ("gather/bins.frag", BINS, _row),
+        ("gather/bins.frag", BINS, _luma),
         ("gather/pack.comp", BINS, _row),
         ("binned/tail.frag", (*BINS, "MAX_EXPONENT"), _row),
-        ("kbuffer-deep/curves.comp", _inputs, {**_row, "COLOURS": 1, "OUTPUTS": 2}),
-        ("kbuffer-deep/curves.comp", _inputs, {**_row, "COLOURS": 0, "OUTPUTS": 1}),
-        ("kbuffer-deep/predict.comp", _inputs, {**_row, "COLOURS": 1, "OUTPUTS": 2, "FEATURES_ONLY": 0}),
-        ("kbuffer-deep/capture.frag", (*BINS, "MAX_EXPONENT"), _row),
-        ("kbuffer/resolve.frag", BINS, {**_row, "STRIDE": 2, "CURSOR": _row["BINS"] // 4}),
+        ("kbuffer-deep/curves.comp", _inputs, {**_luma, "OUTPUTS": 2}),
+        ("kbuffer-deep/curves.comp", _inputs, {**_row, "OUTPUTS": 1}),
+        ("kbuffer-deep/predict.comp", _inputs, {**_luma, "OUTPUTS": 2, "FEATURES_ONLY": 0}),
+        *(
+            (file, (*BINS, "MAX_EXPONENT"), {**_luma, "IN_WORDS": pool, **runs})
+            for file, runs in (("kbuffer-deep/capture.frag", {}), ("kbuffer/resolve.frag", {"RUNS": 1}))
+            for pool in (0, 1)
+        ),
     ]
+COMPILED += [("kbuffer-deep/sort.comp", BINS, {**_luma, "IN_WORDS": pool}) for pool in (0, 1)]
+COMPILED += [
+    (f"allocation/{name}.comp", (*BINS, *ALLOCATION), _luma)
+    for name in ("totals", "complete", "count", "choose", "blocks", "scan", "place")
+]
 
 
 @pytest.mark.parametrize("name", BINNED)
@@ -121,8 +126,8 @@ def test_the_state_is_as_large_as_it_says() -> None:
 
 
 BUFFERS = {
-    "found": {"TileRange", "Found"}, "ranges": {"TileRange"}, "counts": {"Counts", "Cursors"}, "State": {"State"},
-    "Curves": {"Curves"}, "Blocks": {"Blocks"}, "Offsets": {"Offsets"}, "Pool": {"Pool", "Colours"},
+    "found": {"TileRange", "Found"}, "ranges": {"TileRange"}, "bins": {"Words"}, "State": {"State"},
+    "Blocks": {"Blocks"}, "Pool": {"Pool"},
     "the": {"Pixels"}, "answers": {"Answers", "Features"},
 }  # fmt: skip
 """What the document binds -> the names of its block in the shaders."""
@@ -137,19 +142,21 @@ def bindings(shader: str) -> set[tuple[int, str]]:
     ("number", "shaders"),
     [
         (2, ["range/range.frag", "range/fill.comp"]),
-        (3, ["gather/bins.frag", "common/tile_range.glsl"]),
-        (4, ["common/tile_range.glsl"]),
-        (5, ["allocation/state.glsl", "allocation/bins.glsl", "kbuffer-deep/inputs.glsl", "kbuffer-deep/curves.comp"]),
+        (3, ["gather/bins.frag", "gather/pack.comp", "common/bin_words.glsl", "common/tile_range.glsl"]),
+        (4, ["common/bin_words.glsl", "common/tile_range.glsl"]),
+        (5, ["allocation/state.glsl", "allocation/bins.glsl", "common/bin_words.glsl"]),
+        (5, ["kbuffer-deep/inputs.glsl", "kbuffer-deep/curves.comp", "common/tile_range.glsl"]),
         (5, ["allocation/count.comp", "allocation/blocks.comp", "allocation/scan.comp", "allocation/place.comp"]),
-        (7, ["kbuffer-deep/capture.frag", "common/tile_range.glsl"]),
-        (8, ["kbuffer-deep/sort.comp"]),
-        (9, ["kbuffer/resolve.frag", "kbuffer-deep/predict.comp", "common/tile_range.glsl", "allocation/bins.glsl"]),
+        (7, ["kbuffer-deep/capture.frag", "common/bin_words.glsl", "common/pool.glsl", "common/tile_range.glsl"]),
+        (8, ["kbuffer-deep/sort.comp", "common/bin_words.glsl", "common/pool.glsl"]),
+        (9, ["common/bin_words.glsl", "common/pool.glsl"]),  # of kbuffer/resolve.frag, with RUNS
+        (9, ["kbuffer-deep/predict.comp", "common/bin_words.glsl", "common/tile_range.glsl"]),
     ],
 )
 def test_bindings_are_those_of_the_shaders(number: int, shaders: list[str]) -> None:
     part = re.split(r"^\d\. \*\*", FRAME, flags=re.MULTILINE)[number]
     documented = {
         (int(i), block) for i, name in re.findall(r"\[(\d)\]\s(\w+)", part) for block in BUFFERS.get(name, set())
-    } | {(7, "TileRange") for _ in re.findall(r"\[7\] and textures as there", part)}
+    } | {(7, "TileRange") for _ in re.findall(r"\[7\] and the texture as there", part)}
     own = set().union(*(bindings(shader) for shader in shaders))
     assert own <= documented

@@ -925,12 +925,16 @@ var<workgroup> part: array<vec2u, 256>;
 fn bins_within(p: u32, cut: u32, room: u32) -> u32 {
     var bins = cut & 31u;
     var taken = 0u;
-    for (var bin = bins; bin < ((cut >> 15u) & 31u); bin++) {
-        taken += count_of(p, bin);
+    let end = (cut >> 15u) & 31u;
+    for (var bin = bins; bin < end; bin++) {
+        let own = count_of(p, bin);
+        taken += own;
         if (taken > room) {
             break;
         }
-        bins = bin + 1u;
+        if (own > 0u) {
+            bins = bin + 1u;
+        }
     }
     return bins;
 }
