@@ -30,12 +30,12 @@ def write(folder: Path, weights: Weights) -> Path:
 
 @pytest.mark.parametrize(
     ("features", "hidden"),
-    [(FEATURES[:26], (32, 16)), (FEATURES[::3], (16,)), (("rgb_std_g",), ()), (FEATURES[::-1], (8, 8, 8))],
+    [(FEATURES[:26], (32, 16)), (FEATURES[::3], (16,)), (("luma_std",), ()), (FEATURES[::-1], (8, 8, 8))],
 )
 def test_all_forms_agree(
     gl: moderngl.Context, tmp_path: Path, features: tuple[str, ...], hidden: tuple[int, ...]
 ) -> None:
-    weights = random_weights(len(hidden), features, hidden)
+    weights = random_weights(1 + len(hidden), features, hidden)
     inputs = real_features(100_000, 1)
     report = check(weights, write(tmp_path, weights), inputs, gl)
     assert report.count == 100_000
