@@ -58,20 +58,31 @@ class Frame:
         width: Pixels per row.
         height: Rows; row 0 is at the top.
         clear: Linear RGB where no opaque surface is.
+        float_sums: Sum what a binned tail blends in float32 instead of half floats and 16-bit whole numbers: to tell
+            what its arithmetic is wrong by from what the sums lose.
 
     Attributes:
         culled_triangles: Triangles outside the frustum, which no pass draws.
         tiles: By their fullest pixel, once `depth_range` has counted; None before.
     """
 
-    def __init__(self, gpu: GpuScene, view: View, width: int, height: int, clear: RGB = (1.0, 1.0, 1.0)) -> None:
+    def __init__(
+        self,
+        gpu: GpuScene,
+        view: View,
+        width: int,
+        height: int,
+        clear: RGB = (1.0, 1.0, 1.0),
+        *,
+        float_sums: bool = False,
+    ) -> None:
         if width < 1 or height < 1 or width * height > LIMITS.pixels:
             raise Problem(
                 f"A picture of {width}x{height} pixels is outside the limits.",
                 f"Ask for 1x1 up to {LIMITS.pixels:,} pixels.",
                 ExitCode.LIMIT,
             )
-        self.gpu, self.ctx, self.view = gpu, gpu.ctx, view
+        self.gpu, self.ctx, self.view, self.float_sums = gpu, gpu.ctx, view, float_sums
         self.width, self.height, self.pixels = width, height, width * height
         self.clock = Clock(self.ctx)
         self.uniforms, projection, to_view = self._camera()
@@ -162,10 +173,10 @@ class Frame:
         """Float32 textures of the frame's size, zero, one for each number of components."""
         return self._zeroed([self.ctx.texture((self.width, self.height), count, dtype="f4") for count in components])
 
-    def targets(self, count: int, dtype: str, components: int = 4) -> list[moderngl.Texture]:
-        """Textures of the frame's size, zero."""
-        size = self.width, self.height
-        return self._zeroed([self.ctx.texture(size, components, dtype=dtype) for _ in range(count)])
+    def tail_sums(self) -> list[moderngl.Texture]:
+        """Targets for the sums of a binned tail, zero: weighted colour and weight, optical depth."""
+        size, kinds = (self.width, self.height), ("f4", "f4") if self.float_sums else ("f2", "nu2")
+        return self._zeroed([self.ctx.texture(size, 4, dtype=kinds[0]), self.ctx.texture(size, 1, dtype=kinds[1])])
 
     def _zeroed(self, made: list[moderngl.Texture]) -> list[moderngl.Texture]:
         """The same textures, of the frame's size, as targets."""

@@ -249,7 +249,7 @@ def tail_targets(frame: Frame, tail: TailInputs) -> list[moderngl.Texture]:
     if tail.tail is None:
         return []
     if tail.tail.bins:
-        return [*frame.targets(1, "f2"), *frame.targets(1, "nu2", 1)]
+        return frame.tail_sums()
     return frame.float_targets(4, 4)
 
 

@@ -119,7 +119,7 @@ def make_case(ctx: moderngl.Context, scenery: Scenery, programs: Programs) -> Ca
     """Upload and capture a scenery; shaders are compiled once for all of them."""
     gpu = GpuScene(ctx, scenery.scene)
     gpu.programs = programs
-    frame = Frame(gpu, scenery.view, *scenery.size)
+    frame = Frame(gpu, scenery.view, *scenery.size, float_sums=True)
     dump = capture(frame).dump
     occupied = np.flatnonzero(dump.counts)
     # The pixels of a stack have the same list but for highlights: one of each, and some more, are enough.

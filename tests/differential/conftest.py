@@ -16,7 +16,7 @@ from schemas.fragments import FragmentDump
 
 @pytest.fixture(scope="module")
 def frame(gl: moderngl.Context) -> Frame:
-    return Frame(GpuScene(gl, shells()), VIEW, *SIZE)
+    return Frame(GpuScene(gl, shells()), VIEW, *SIZE, float_sums=True)
 
 
 @pytest.fixture(scope="module")

@@ -20,12 +20,23 @@ from schemas.tail import BINNED_TAILS, TAILS, TailName
 @pytest.mark.parametrize("tail", BINNED_TAILS)
 @pytest.mark.parametrize("size", [SIZE, (61, 45), (1, 1)], ids=str)
 def test_it_looks_as_simulated_without_a_core(gl: moderngl.Context, tail: TailName, size: tuple[int, int]) -> None:
-    frame = Frame(GpuScene(gl, shells()), VIEW, *size)
+    frame = Frame(GpuScene(gl, shells()), VIEW, *size, float_sums=True)
     dump = capture(frame).dump
     rendered = Binned(tail).render(frame, Budget(10**6))
     assert not rendered.k.any()
     simulated = composite(dump, rendered.k, tail).reshape(rendered.linear.shape)
     np.testing.assert_allclose(rendered.linear, simulated, atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("tail", BINNED_TAILS)
+def test_half_floats_change_less_than_a_display_shows(gl: moderngl.Context, tail: TailName) -> None:
+    gpu = GpuScene(gl, shells())
+    half, full = (
+        Binned(tail).render(Frame(gpu, VIEW, *SIZE, float_sums=floats), Budget(0)).linear for floats in (False, True)
+    )
+    apart = np.abs(half - full)
+    assert 0.0 < apart.max() < 2e-3
+    assert np.square(apart).mean() < 2e-8
 
 
 def test_it_draws_the_geometry_twice_beside_the_ranges_and_has_neither_pool_nor_atomics(

@@ -9,7 +9,6 @@ import moderngl
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.frames import float_sums
 from support.scenes import SIZE, VIEW, shells
 from support.training import export_random, random_weights
 
@@ -198,13 +197,12 @@ def test_with_any_ranges_the_picture_is_as_simulated(
         "zero": np.zeros_like(own),
     }[given]
     ranges = np.ascontiguousarray(ranges, dtype=np.float32)
-    frame = Frame(gpu, VIEW, *size)
+    frame = Frame(gpu, VIEW, *size, float_sums=True)
     monkeypatch.setattr(Frame, "_estimated_range", lambda self: self.ctx.buffer(ranges))
     dump = replace(plain, tile_range=None if given == "none" else ranges)
     binned = frame.gather_bins(tail)
     assert np.array_equal(words_of(binned), expected_words(dump, TAILS[tail]))
     assert np.array_equal(binned.counts(), counted(dump, TAILS[tail]))
-    float_sums(monkeypatch)
     rendered = technique("kbuffer").render(frame, Budget(2 * dump.pixels, tail))
     simulated = composite(dump, rendered.k, tail).reshape(rendered.linear.shape)
     np.testing.assert_allclose(rendered.linear, simulated, atol=3e-6, rtol=0)

@@ -8,7 +8,6 @@ import moderngl
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from support.frames import float_sums
 from support.scenes import SIZE, VIEW, shells
 from support.training import export_overflowing, export_random, random_weights
 
@@ -69,18 +68,12 @@ def counts_of(frame: Frame) -> NDArray[np.uint8]:
 
 @pytest.mark.parametrize("tail", BINNED_TAILS)
 def test_first_frame_is_that_of_kbuffer_deep_and_sees_what_last_fragments_change(
-    gpu: GpuScene,
-    dump: FragmentDump,
-    gl: moderngl.Context,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    tail: TailName,
+    gpu: GpuScene, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, tail: TailName
 ) -> None:
-    float_sums(monkeypatch)
     export_random(tmp_path, random_weights(11), derive(gather(dump, tail))[dump.counts > 0], gl, tail)
     budget, temporal = Budget(fragments_of(dump, 0.3), tail), KBufferTemporal(tmp_path)
-    first = temporal.render(Frame(gpu, VIEW, *SIZE), budget)
-    plain = KBufferDeep(tmp_path).render(Frame(gpu, VIEW, *SIZE), budget)
+    first = temporal.render(Frame(gpu, VIEW, *SIZE, float_sums=True), budget)
+    plain = KBufferDeep(tmp_path).render(Frame(gpu, VIEW, *SIZE, float_sums=True), budget)
     assert np.array_equal(first.linear, plain.linear)
     assert np.array_equal(first.k, plain.k)
     assert first.pixel_bytes == plain.pixel_bytes + MEMORY_BYTES

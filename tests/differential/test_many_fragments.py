@@ -47,7 +47,7 @@ class Case:
 
 def make_case(gl: moderngl.Context, layers: int) -> Case:
     stacks = extreme_stacks(layers)
-    frame = Frame(GpuScene(gl, stack_scene(stacks)), VIEW, *size(len(stacks)))
+    frame = Frame(GpuScene(gl, stack_scene(stacks)), VIEW, *size(len(stacks)), float_sums=True)
     return Case(frame, capture(frame).dump)
 
 

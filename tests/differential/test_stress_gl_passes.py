@@ -123,24 +123,29 @@ def test_a_broken_tail_is_a_violation_and_named(gl: moderngl.Context, monkeypatc
     [
         (
             "gather/pack.comp",
-            "level(front[b + 1], total,",
-            "level(front[b + 1] / 2u, total,",
+            "level(front, total,",
+            "level(front / 2u, total,",
             {"bins.kept", "features.kept"},
         ),
-        ("gather/pack.comp", "level(moved[j],", "level(moved[j] / 2u,", {"bins.kept", "features.kept"}),
+        (
+            "gather/pack.comp",
+            "level(moment_of(word[b]),",
+            "level(moment_of(word[b]) / 2u,",
+            {"bins.kept", "features.kept"},
+        ),
         (
             "common/depth_bins.glsl",
             "precise float root = float(ROOT_SHARE)",
             "precise float root = 0.9",
             {"bins.kept", "bins.counts"},
         ),
-        ("gather/bins.frag", "floor(moved)", "ceil(moved)", {"bins.kept"}),
-        ("gather/bins.frag", "before + (1u << shift)", "before + (2u << shift)", {"bins.counts", "features"}),
+        ("gather/bins.frag", "place - float(bin)) + 0.5", "place - float(bin)) + 0.9", {"bins.kept"}),
+        ("gather/bins.frag", "count_of(before) + 1u", "count_of(before) + 2u", {"bins.counts", "features"}),
         (
             "gather/bins.frag",
-            "optical_depth * vec4(rgb * rgb, y)",
-            "optical_depth * vec4(9.0 * rgb * rgb, y)",
-            {"bins.colours", "features.half spread"},
+            "units * luma * luma +",
+            "2u * units * luma * luma +",
+            {"bins.luma", "features.spread"},
         ),
         (
             "kbuffer-deep/inputs.glsl",
