@@ -7,11 +7,12 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
+from support.scenes import SIZE, VIEW, shells
 from support.training import random_weights
 
 from renderer.features import derive, gather
 from renderer.frame import Frame
-from renderer.gpu_scene import TRANSPARENT
+from renderer.gpu_scene import TRANSPARENT, GpuScene
 from renderer.programs import Defines, expand
 from renderer.techniques import Binned, Budget, KBufferDeep
 from schemas.bundle import GLSL, HeadName, OutputName, ParityReport, Provenance, TailSpec, load_manifest
@@ -49,6 +50,12 @@ LIMITS: Defines = {
 }
 ONES = 0xFFFFFFFF
 STATE, FOUND, POOL, BLOCKS, BINS, RANGES = 0, 0, 2, 3, 5, 7
+
+
+@pytest.fixture(scope="module")
+def frame(gl: moderngl.Context) -> Frame:
+    """With sums in the document's formats."""
+    return Frame(GpuScene(gl, shells()), VIEW, *SIZE)
 
 
 class Client:

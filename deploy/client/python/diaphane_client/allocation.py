@@ -104,7 +104,7 @@ def _ranks(gain: NDArray[np.float32], fall: NDArray[np.float32], growth: NDArray
     steps = np.float32(0.5) * (2 * after - growth).astype(np.float32) - np.float32(1.0)
     price = fall[:, None] * steps - gain[:, None]
     above = np.maximum(price - np.float32(LEAST_PRICE), np.float32(1.0))
-    return np.minimum(above.view(np.uint32).astype(np.int64) - _BITS_OF_ONE >> DROPPED_BITS, RANKS - 1)
+    return np.asarray(np.minimum(above.view(np.uint32).astype(np.int64) - _BITS_OF_ONE >> DROPPED_BITS, RANKS - 1))
 
 
 def _cuts(growth: NDArray[np.int64], granted: NDArray[np.bool_], *, complete: bool) -> Cuts:
