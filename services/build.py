@@ -75,7 +75,8 @@ def _write_report(path: Path, options: BuildOptions, built: Built, runner: Inlin
 def command_line(options: BuildOptions) -> str:
     """The command that asks for this build again."""
     parts = ["diaphane", "build", *map(str, options.scenes)]
-    parts += ["--budgets", ",".join(f"{budget:g}" for budget in options.budgets)]
+    if options.budgets is not None:
+        parts += ["--budgets", ",".join(f"{budget:g}" for budget in options.budgets)]
     parts += ["--name", options.name, "--size", f"{options.width}x{options.height}"]
     parts += ["--alpha", f"{options.alpha:g}"] if options.alpha is not None else []
     for scene in options.holdout:

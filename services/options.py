@@ -35,7 +35,8 @@ class BuildOptions:
     Attributes:
         scenes: USD files, in the order given.
         name: Name of the bundle in the registry.
-        budgets: Fragments of a frame as multiples of width * height, ascending, without duplicates.
+        budgets: Fragments of a frame as multiples of width * height, ascending, without duplicates; None: what the
+            captured views call for (`labeller.budgets`).
         holdout: Those of `scenes` that are evaluated on and never trained on. Empty: chosen by `default_holdout`.
         alpha: Opacity in (0, 1) that every surface gets; None keeps the materials' own.
         views: JSON file with views; None: the stage's cameras, else sampled ones.
@@ -60,7 +61,7 @@ class BuildOptions:
 
     scenes: tuple[Path, ...]
     name: str
-    budgets: tuple[float, ...] = (1.0, 2.0, 4.0)
+    budgets: tuple[float, ...] | None = None
     holdout: tuple[Path, ...] = ()
     alpha: float | None = None
     views: Path | None = None
@@ -83,7 +84,8 @@ class BuildOptions:
         check_bundle_tail(self.tail)
         _check_scenes(self.scenes)
         _check_numbers(self)
-        object.__setattr__(self, "budgets", tuple(sorted(set(self.budgets))))
+        if self.budgets is not None:
+            object.__setattr__(self, "budgets", tuple(sorted(set(self.budgets))))
         object.__setattr__(self, "holdout", _resolve_holdout(self.holdout, self.scenes))
         if self.views is not None and not self.views.is_file():
             raise Problem(
@@ -229,7 +231,7 @@ def check_bundle(reference: str | None, option: str) -> None:
 
 
 def parse_budgets(text: str) -> tuple[float, ...]:
-    """Comma-separated budgets, as in `1,2,4`.
+    """Comma-separated budgets, as in `.5,1,2`.
 
     Raises:
         Problem: An entry is not a number.
@@ -237,7 +239,7 @@ def parse_budgets(text: str) -> tuple[float, ...]:
     try:
         return tuple(float(part) for part in text.split(",") if part.strip())
     except ValueError:
-        raise Problem(f"--budgets '{text}' is not a list of numbers.", "Write it like --budgets 1,2,4.") from None
+        raise Problem(f"--budgets '{text}' is not a list of numbers.", "Write it like --budgets .5,1,2.") from None
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -318,16 +320,12 @@ def _check_scenes(scenes: tuple[Path, ...]) -> None:
 
 
 def _check_numbers(o: BuildOptions) -> None:
-    if not o.budgets:
-        raise Problem("No budget was given.", "Give at least one: --budgets 1,2,4.")
-    if len(o.budgets) > LIMITS.budgets:
-        raise Problem(f"{len(o.budgets)} budgets are not possible.", f"Give 1 to {LIMITS.budgets}.")
     size, views = f"--size {o.width}x{o.height}", f"--views-per-scene {o.views_per_scene}"
     _require(min(o.width, o.height) >= LIMITS.min_side, size, f"is below {LIMITS.min_side} pixels a side")
     _require(max(o.width, o.height) <= LIMITS.max_side, size, f"is beyond {LIMITS.max_side} pixels a side")
     _require(o.width * o.height <= LIMITS.pixels, size, f"is beyond {LIMITS.pixels} pixels")
-    for budget in o.budgets:
-        check_budget(budget, "--budgets 1,2,4", (o.width, o.height))
+    if o.budgets is not None:
+        _check_budgets(o.budgets, (o.width, o.height))
     check_bundle(o.start, "--from")
     _require(o.alpha is None or 0.0 < o.alpha < 1.0, f"--alpha {o.alpha}", "is not between 0 and 1 (both excluded)")
     _require(1 <= o.views_per_scene <= LIMITS.views, views, f"is not 1..{LIMITS.views}")
@@ -336,6 +334,15 @@ def _check_numbers(o: BuildOptions) -> None:
     _require(o.steps is None or 1 <= o.steps <= LIMITS.steps, f"--steps {o.steps}", f"is not 1..{LIMITS.steps}")
     _require(0 <= o.patience <= LIMITS.steps, f"--patience {o.patience}", f"is not 0..{LIMITS.steps}")
     _require(o.replay is None or o.start is not None, "--replay", "needs --from: there is nothing to forget without it")
+
+
+def _check_budgets(budgets: tuple[float, ...], size: tuple[int, int]) -> None:
+    if not budgets:
+        raise Problem("No budget was given.", "Give at least one, --budgets .5,1,2, or leave out --budgets.")
+    if len(budgets) > LIMITS.budgets:
+        raise Problem(f"{len(budgets)} budgets are not possible.", f"Give 1 to {LIMITS.budgets}.")
+    for budget in budgets:
+        check_budget(budget, "--budgets .5,1,2", size)
 
 
 def _require(holds: bool, option: str, fault: str) -> None:

@@ -11,7 +11,7 @@ from schemas.job import JobSpec
 from schemas.measurement import Measurement, RegistryResult, SceneSummary
 from schemas.problem import ExitCode, Problem
 from schemas.service import SceneRecord, ShardRef
-from services import steps, summary
+from services import budgets, steps, summary
 from services.acceptance import begun_plan
 from services.fine_tuning import without_champion
 from services.plan import Plan, plan_of_job, source_of_version
@@ -27,7 +27,7 @@ class Built:
     """What the main job found and made.
 
     Attributes:
-        plan: What was asked for.
+        plan: What was asked for, with its budgets.
         scenes: All scenes.
         views: All labelled views.
         bundle: The exported bundle.
@@ -54,7 +54,9 @@ def build(plan: Plan, runner: Runner) -> Built:
         Problem: Bad input, no GL driver, or a check that does not hold.
     """
     scenes = steps.read_scenes(plan, runner)
-    views = steps.label_views(plan, runner, steps.render_views(plan, runner, scenes))
+    rendered = steps.render_views(plan, runner, scenes)
+    plan = budgets.decided(plan, rendered, runner.progress)
+    views = steps.label_views(plan, runner, rendered)
     champion = _champion(plan, runner)
     bundle = _learn(plan, runner, scenes, views, champion)
     judged = [view for view in views if view.scene.held_out] or list(views)
@@ -122,6 +124,7 @@ def run_job(spec: JobSpec, scenes: Mapping[str, SceneRecord], runner: Runner, jo
     rendered = steps.render_views(plan, runner, entries)
     if spec.kind == "render":
         return {"views": [_view_result(view) for view in rendered]}
+    plan = budgets.decided(plan, rendered, runner.progress)
     views = steps.label_views(plan, runner, rendered)
     dataset = _record_dataset(plan, runner, views)
     if spec.kind == "train":

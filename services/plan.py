@@ -41,7 +41,8 @@ class Plan:
     Attributes:
         name: Name of the bundle; empty where none is made.
         scenes: The scenes, in the order given.
-        factors: Budgets as multiples of width * height, ascending.
+        factors: Budgets as multiples of width * height, ascending; empty until `services.budgets.decided` where none
+            were given.
         alpha: Opacity that every surface gets; None keeps the materials' own.
         views_per_scene: How many views are sampled of a scene without cameras.
         width: Pixels per row.
@@ -59,6 +60,7 @@ class Plan:
         replay: Shards of an earlier data set in a folder that are trained on as well.
         replayed: Digest of the scene and label artifact of every shard of earlier jobs that is trained on as well.
         learned: Label -> digest of what was learned before, for provenance.
+        is_scored: Whether a version is to be published with a score.
     """
 
     name: str
@@ -81,11 +83,18 @@ class Plan:
     replay: Source | None = None
     replayed: tuple[tuple[str, str], ...] = ()
     learned: Mapping[str, str] = field(default_factory=dict)
+    is_scored: bool = True
+
+    @property
+    def pixels(self) -> int:
+        """Of a picture."""
+        return self.width * self.height
 
     @property
     def budgets(self) -> tuple[int, ...]:
         """Budgets in fragments, F, in the order of the factors."""
-        return tuple(int(factor * self.width * self.height) for factor in self.factors)
+        assert self.factors, "budgets are decided once the views are captured"
+        return tuple(int(factor * self.pixels) for factor in self.factors)
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -134,7 +143,7 @@ def plan_of_build(options: BuildOptions) -> Plan:
     return Plan(
         name=options.name,
         scenes=tuple(scenes),
-        factors=options.budgets,
+        factors=options.budgets or (),
         alpha=options.alpha,
         views_per_scene=options.views_per_scene,
         width=options.width,
@@ -166,7 +175,7 @@ def plan_of_job(spec: JobSpec, scenes: Mapping[str, SceneRecord]) -> Plan:
     return Plan(
         name=spec.name or "",
         scenes=tuple(planned),
-        factors=tuple(sorted(set(spec.budgets))),
+        factors=tuple(sorted(set(spec.budgets or ()))),
         alpha=spec.alpha,
         views_per_scene=spec.views_per_scene,
         width=spec.width,
@@ -180,6 +189,7 @@ def plan_of_job(spec: JobSpec, scenes: Mapping[str, SceneRecord]) -> Plan:
         weights=spec.weights,
         from_champion=spec.start_from == "champion",
         promote=spec.promote == "if-better",
+        is_scored=spec.kind == "build",
     )
 
 

@@ -55,7 +55,7 @@ def planned(options: BenchOptions, bundle: Bundle | None) -> list[CellKey]:
             bases: Sequence[Basis] = ("fragments", "memory") if options.equal_memory else ("fragments",)
             cells += [
                 CellKey(technique=name, basis=basis, budget_factor=factor, tail=tail, g=g, bundle=label)
-                for factor in options.budgets
+                for factor in options.factors
                 for basis in bases
             ]
     return cells

@@ -13,6 +13,7 @@ from schemas.pixel_weights import DEFAULT_WEIGHTS, WEIGHTS_HELP
 from schemas.tail import BUNDLE_TAIL_HELP, DEFAULT_TAIL, DENSITY_G
 from services.cli import output
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
+from services.cli.technique_options import BudgetsOption
 
 if TYPE_CHECKING:
     from services.options import BuildOptions
@@ -22,9 +23,7 @@ if TYPE_CHECKING:
 def build(
     scenes: Annotated[list[Path], typer.Argument(help="USD files: .usd, .usda, .usdc, .usdz.")],
     name: Annotated[str, typer.Option("--name", help="Name of the bundle in the registry.")],
-    budgets: Annotated[
-        str, typer.Option("--budgets", help="Fragments of a frame, as multiples of width x height.")
-    ] = "1,2,4",
+    budgets: BudgetsOption = None,
     alpha: Annotated[float | None, typer.Option("--alpha", help="Opacity that every surface gets, in (0, 1).")] = None,
     holdout: Annotated[
         list[Path] | None,
@@ -63,7 +62,7 @@ def build(
     options = BuildOptions(
         scenes=tuple(scenes),
         name=name,
-        budgets=parse_budgets(budgets),
+        budgets=None if budgets is None else parse_budgets(budgets),
         holdout=tuple(holdout or ()),
         alpha=alpha,
         views=views,

@@ -18,7 +18,6 @@ from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption, connect
 from services.cli.state import JsonOption
 from services.cli.submit import (
     AlphaOption,
-    BudgetsOption,
     NetworkOption,
     NoReplayOption,
     PatienceOption,
@@ -34,6 +33,7 @@ from services.cli.submit import (
     job_fields,
     job_spec,
 )
+from services.cli.technique_options import BudgetsOption
 
 if TYPE_CHECKING:
     from services.cli.comparison import Comparison

@@ -15,13 +15,11 @@ from schemas.tail import TAIL_HELP
 from services.cli import output
 from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption, connect
 from services.cli.state import JsonOption
+from services.cli.technique_options import BudgetsOption
 
 if TYPE_CHECKING:
     from services.cli.inputs import SceneInput
 
-BudgetsOption = Annotated[
-    str | None, typer.Option("--budgets", help="Fragments of a frame, as multiples of width x height: 1,2,4.")
-]
 AlphaOption = Annotated[float | None, typer.Option("--alpha", help="Opacity that every surface gets, in (0, 1).")]
 ViewsOption = Annotated[Path | None, typer.Option("--views", help="JSON file with the views of local scenes.")]
 ViewsPerSceneOption = Annotated[

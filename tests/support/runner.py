@@ -48,7 +48,7 @@ def measurement(technique: str, mse: float, factor: float = 1.0, view: str = "vi
 
 
 class TableRunner:
-    """Answers every task; `fails` names those that fail, `opaque` and `empty` what is in scenes and views.
+    """Answers every task; `fails` names those that fail, `opaque`, `empty` and `totals` what is in scenes and views.
 
     Attributes:
         asked: Every task, in order.
@@ -62,6 +62,7 @@ class TableRunner:
         self.fails = set(fails)
         self.opaque: set[str] = set()
         self.empty: set[str] = set()
+        self.totals: dict[str, int] = {}
         self.bundle_mse = 1e-5
         self.rival_mse = 3e-5
         self.asked: list[Task] = []
@@ -110,7 +111,11 @@ class TableRunner:
                 "warnings": [],
             }
         if task.stage == "render":
-            return {"total": 0 if task.name in self.empty else 1000, "occupied": 10, "passes": {}}
+            return {
+                "total": 0 if task.name in self.empty else self.totals.get(task.name, 1000),
+                "occupied": 10,
+                "passes": {},
+            }
         if task.stage == "label":
             count = len(task.params["budgets"])
             certificate = {"error": 1.0, "bound": 1.0, "gap": 0.0}

@@ -157,6 +157,74 @@ def test_one_held_out_scene_of_two_without_a_transparent_view_leaves_the_other_s
     assert "nothing is scored" not in said[0]
 
 
+def test_budgets_that_were_not_given_follow_from_the_held_out_views_and_are_in_the_keys() -> None:
+    runner = TableRunner()
+    runner.totals = {"town view0": 600, "town view1": 100, "bottles view0": 25_000}
+    said: list[str] = []
+    runner.progress.note = said.append  # type: ignore[method-assign]
+    run(runner, spec(budgets=None))
+    assert said == [
+        "Budgets 0.05, 0.125, 0.25, 0.5, 1 (x width x height), because the 2 views to measure hold 0.39 to 2.3 "
+        "transparent fragments a pixel: a budget decides something where it holds up to 75% of a view's fragments. "
+        "--budgets gives others."
+    ]
+    factors = [0.05, 0.125, 0.25, 0.5, 1.0]
+    budgets = [int(factor * 256) for factor in factors]
+    assert all(task.params["budgets"] == budgets for task in (*runner.of("label"), *runner.of("evaluate")))
+    assert all(task.params["factors"] == factors for task in runner.of("evaluate"))
+    assert runner.of("export")[0].params["settings"]["budgets"] == factors
+    assert runner.published[0]["evaluation"]["budgets"] == budgets
+    given = TableRunner()
+    run(given, spec(budgets=factors))
+    assert [task.address for task in given.of("label")] == [task.address for task in runner.of("label")]
+
+
+@pytest.mark.parametrize(
+    ("total", "budgets", "why", "remedy"),
+    [
+        (
+            600,
+            [3.0, 4.0],
+            "Even the smallest budget, 3, holds all fragments, as the 6 captured views have 2.3 a pixel",
+            "Give smaller budgets, --budgets 0.25,0.5,1, or render",
+        ),
+        (10, None, "The budget 0.05 holds all fragments, as the 6 captured views have 0.039 a pixel", "Render these"),
+    ],
+)
+def test_a_build_whose_budgets_hold_everything_ends_before_its_labels(
+    total: int, budgets: list[float] | None, why: str, remedy: str
+) -> None:
+    runner = TableRunner()
+    runner.totals = {f"{record.name} view{view}": total for record in SCENES.values() for view in range(2)}
+    with pytest.raises(Problem) as caught:
+        run(runner, spec(budgets=budgets))
+    assert caught.value.title.startswith(why)
+    assert caught.value.remedy.startswith(remedy)
+    assert runner.stages() == ["scene", "render"]
+    assert not runner.published
+
+
+def test_budgets_that_hold_all_held_out_views_are_said_before_the_training() -> None:
+    runner = TableRunner()
+    runner.totals = {"town view0": 600, "town view1": 100}
+    said: list[str] = []
+
+    def note(text: str) -> None:
+        assert runner.stages() == ["scene", "render"]
+        said.append(text)
+
+    runner.progress.note = note  # type: ignore[method-assign]
+    run(runner, spec(budgets=[3.0]))
+    assert len(said) == 1
+    assert "Nothing will be scored. Give smaller budgets, --budgets 0.05,0.125,0.25,0.5,1, or" in said[0]
+
+
+def test_labels_alone_may_hold_everything() -> None:
+    runner = TableRunner()
+    result = run(runner, spec("label", name=None, budgets=[64.0]))
+    assert len(result["views"]) == 6
+
+
 def test_what_took_no_part_in_the_labels_is_counted_over_all_views() -> None:
     runner = TableRunner()
     run(runner, spec())
