@@ -6,6 +6,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
+from schemas.licence import MOST_CHARACTERS
 from schemas.limits import LIMITS
 from schemas.network import DEFAULT_NETWORK, NetworkSize
 from schemas.pixel_weights import DEFAULT_WEIGHTS, PixelWeights
@@ -50,6 +51,7 @@ class SceneUse(BaseModel):
     Attributes:
         scene: Its id.
         holdout: Whether it is evaluated on and never trained on.
+        licence: Its licence and whom to name for it, for the model card; None: as its stage states them.
         views: Cameras in stage units and axes; empty: the stage's own, else sampled ones.
     """
 
@@ -57,6 +59,7 @@ class SceneUse(BaseModel):
 
     scene: SceneId
     holdout: bool = False
+    licence: Annotated[str, StringConstraints(strip_whitespace=True, max_length=MOST_CHARACTERS)] | None = None
     views: tuple[SceneView, ...] = Field(default=(), max_length=LIMITS.views)
 
     @model_validator(mode="after")

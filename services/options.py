@@ -12,12 +12,13 @@ from __future__ import annotations
 import hashlib
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
 from schemas.bundle import TailSpec
+from schemas.licence import tidy
 from schemas.limits import LIMITS
 from schemas.network import DEFAULT_NETWORK, SIZES, NetworkSize
 from schemas.pixel_weights import DEFAULT_WEIGHTS, PIXEL_WEIGHTS, PixelWeights
@@ -38,6 +39,7 @@ class BuildOptions:
         budgets: Fragments of a frame as multiples of width * height, ascending, without duplicates; None: what the
             captured views call for (`labeller.budgets`).
         holdout: Those of `scenes` that are evaluated on and never trained on. Empty: chosen by `default_holdout`.
+        licences: Scene -> its licence and whom to name for it, instead of what its stage states.
         alpha: Opacity in (0, 1) that every surface gets; None keeps the materials' own.
         views: JSON file with views; None: the stage's cameras, else sampled ones.
         views_per_scene: How many views are sampled of a scene without cameras of its own.
@@ -63,6 +65,7 @@ class BuildOptions:
     name: str
     budgets: tuple[float, ...] | None = None
     holdout: tuple[Path, ...] = ()
+    licences: Mapping[Path, str] = field(default_factory=dict)
     alpha: float | None = None
     views: Path | None = None
     views_per_scene: int = 3
@@ -240,6 +243,37 @@ def parse_budgets(text: str) -> tuple[float, ...]:
         return tuple(float(part) for part in text.split(",") if part.strip())
     except ValueError:
         raise Problem(f"--budgets '{text}' is not a list of numbers.", "Write it like --budgets .5,1,2.") from None
+
+
+def parse_licences(texts: Sequence[str], scenes: Sequence[str]) -> dict[str, str]:
+    """Licences of scenes, with whom to name for them.
+
+    Args:
+        texts: Each the licence of all scenes, or `SCENE=LICENCE`, which comes before that.
+        scenes: As named on the command line; one can be meant by its stem too.
+
+    Returns:
+        Scene as named -> licence.
+
+    Raises:
+        Problem: A licence is empty, or of no scene that is named, or of several.
+    """
+    of_all: dict[str, str] = {}
+    own: dict[str, str] = {}
+    for text in texts:
+        name, equals, licence = text.partition("=")
+        named = [scene for scene in scenes if scene == name] or [scene for scene in scenes if Path(scene).stem == name]
+        said = tidy(licence if equals else text)
+        if not said or (equals and len(named) != 1):
+            raise Problem(
+                f"--licence '{text}' names no licence of a scene.",
+                'Write it like --licence "CC0" for all scenes, or --licence "SCENE=CC-BY-4.0, by somebody" for one.',
+            )
+        if equals:
+            own[named[0]] = said
+        else:
+            of_all = dict.fromkeys(scenes, said)
+    return {**of_all, **own}
 
 
 def parse_size(text: str) -> tuple[int, int]:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 import typer
 
+from schemas.bundle import CARD
+from schemas.licence import verdict
 from schemas.problem import ExitCode, Problem
 from services.cli import output
 from services.cli.lines import plain
@@ -97,8 +99,12 @@ def show(
         score = "none" if version["score"] is None else f"{version['score']:.4g}"
         print(f"{name}@{version['version']}  score {score}  {version['created']}  {', '.join(marks)}".rstrip())
         print(f"  sha256 {version['digest']}")
+        provenance = version["provenance"]
+        print(f"  {plain(verdict(provenance['scenes'], provenance.get('licences', {})))}")
         if "folder" in version:
             print(f"  {version['folder']}")
+        if CARD in version["files"]:
+            print(f"  {CARD}: {_card(version)}")
     for move in meaning["history"]:
         who, why = plain(move["who"]), plain(move["why"])
         print(f"{move['at']}  {move['alias']}: {move['before'] or 'none'} -> {move['after']}  by {who}: {why}")
@@ -133,6 +139,13 @@ def rollback(
     with closing(_open(state, url, key_file)) as registry:
         registry.roll_back(name, alias, reason)
         _say(registry, name, alias)
+
+
+def _card(version: dict[str, Any]) -> str:
+    """Where the model card of a version is: a file, or an address of the server."""
+    if "folder" in version:
+        return f"{version['folder']}/{CARD}"
+    return f"/v1/blobs/sha256/{version['files'][CARD]['sha256']}"
 
 
 def _say(registry: Models, name: str, alias: str) -> None:
@@ -181,7 +194,8 @@ class _Local:
         self._registry.rollback(name, reason, alias)
 
     def _detail(self, publication: Publication) -> dict[str, Any]:
-        return {**publication.model_dump(mode="json"), "folder": str(self._registry.folder(publication))}
+        record = self._registry.record(publication).model_dump(mode="json")
+        return {**record, "folder": str(self._registry.folder(publication))}
 
 
 class _Server:
