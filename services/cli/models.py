@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 import typer
 
-from schemas.bundle import CARD
 from schemas.licence import verdict
 from schemas.problem import ExitCode, Problem
 from services.cli import output
@@ -103,8 +102,8 @@ def show(
         print(f"  {plain(verdict(provenance['scenes'], provenance.get('licences', {})))}")
         if "folder" in version:
             print(f"  {version['folder']}")
-        if CARD in version["files"]:
-            print(f"  {CARD}: {_card(version)}")
+        if card := _card(version):
+            print(f"  model card: {card}")
     for move in meaning["history"]:
         who, why = plain(move["who"]), plain(move["why"])
         print(f"{move['at']}  {move['alias']}: {move['before'] or 'none'} -> {move['after']}  by {who}: {why}")
@@ -141,8 +140,13 @@ def rollback(
         _say(registry, name, alias)
 
 
-def _card(version: dict[str, Any]) -> str:
-    """Where the model card of a version is: a file, or an address of the server."""
+def _card(version: dict[str, Any]) -> str | None:
+    """Where the model card of a version is, if it has one: a file, or an address of the server."""
+    # Imported late: `diaphane --help` needs no schemas.
+    from schemas.bundle import CARD
+
+    if CARD not in version["files"]:
+        return None
     if "folder" in version:
         return f"{version['folder']}/{CARD}"
     return f"/v1/blobs/sha256/{version['files'][CARD]['sha256']}"
