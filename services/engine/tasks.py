@@ -61,6 +61,21 @@ class Place:
         return sa.and_(tables.tasks.c.job_id == self.job_id, tables.tasks.c.position == self.position)
 
 
+@dataclass(frozen=True, slots=True)
+class Begun:
+    """A task that a worker has begun.
+
+    Attributes:
+        task: What to make.
+        again: Whether it was begun before.
+        owner: Id of the key that submitted the job.
+    """
+
+    task: Task
+    again: bool
+    owner: str
+
+
 class Tasks:
     """The tasks of all jobs.
 
@@ -155,7 +170,7 @@ class Tasks:
 
         self._database.retry(body, PATIENCE_SECONDS)
 
-    def begin(self, claim: Claim, place: Place, errors: int = 0) -> tuple[Task, bool] | None:
+    def begin(self, claim: Claim, place: Place, errors: int = 0) -> Begun | None:
         """A worker begins a task.
 
         Args:
@@ -164,14 +179,13 @@ class Tasks:
             errors: How often it failed before.
 
         Returns:
-            The task, and whether it was begun before; None if it is at its end, or another job makes the same now:
-            then it is tried again later.
+            The task; None if it is at its end, or another job makes the same now: then it is tried again later.
 
         Raises:
             Abandoned: The claim was lost.
         """
 
-        def body(connection: sa.Connection) -> tuple[Task, bool] | None:
+        def body(connection: sa.Connection) -> Begun | None:
             job = lock_job(connection, place.job_id)
             claim.check(connection, self._database)
             row = connection.execute(sa.select(tables.tasks).where(place.row)).first()
@@ -184,7 +198,7 @@ class Tasks:
             values = {"state": "running", "executor": claim.executor, "started": time.time(), "finished": None}
             connection.execute(tables.tasks.update().where(place.row).values(**values, progress=None, note=None))
             events.add(connection, place.job_id, ("task", _event(row, "running", executor=claim.executor)))
-            return Task.model_validate(row.task), row.started is not None
+            return Begun(Task.model_validate(row.task), row.started is not None, job.submitted_by)
 
         return self._database.retry(body, PATIENCE_SECONDS)
 

@@ -19,6 +19,7 @@ from obstore.exceptions import AlreadyExistsError, BaseError, PermissionDeniedEr
 from obstore.store import S3Store
 
 from schemas.problem import ExitCode, Problem
+from services.store import StoreAway
 
 RANGE_BYTES = 16 << 20
 """Bytes of one request when a large object is read: each request is repeated by itself if its connection is cut."""
@@ -26,7 +27,8 @@ RANGE_BYTES = 16 << 20
 USED_SECONDS = 12 * 3600.0
 """How stale the note of an object's last use may be; retention counts in days."""
 
-_RETRY_SECONDS = 20.0
+_PAUSE = timedelta(seconds=2)
+"""Longest time between two tries: a store that is back is used again within it."""
 _USED = "used"
 _FULL = ("XMinioStorageFull", "QuotaExceeded", "InsufficientStorage", "507 Insufficient Storage")
 """What servers call it."""
@@ -62,8 +64,12 @@ class Remote:
         self._lock = threading.Lock()
 
     @classmethod
-    def open(cls, url: str) -> Self:
+    def open(cls, url: str, patience: float = 20.0) -> Self:
         """The store that `s3://bucket/prefix` names; credentials, region and endpoint from `AWS_*`.
+
+        Args:
+            url: Of the store.
+            patience: Seconds for which a request that is not answered is repeated.
 
         Raises:
             Problem: The URL names no bucket.
@@ -76,7 +82,11 @@ class Remote:
             bucket,
             prefix=prefix.strip("/") or None,
             client_options={"allow_http": endpoint.startswith("http://"), "timeout": timedelta(minutes=5)},
-            retry_config={"max_retries": 8, "retry_timeout": timedelta(seconds=_RETRY_SECONDS)},
+            retry_config={
+                "max_retries": 10_000,
+                "retry_timeout": timedelta(seconds=patience),
+                "backoff": {"init_backoff": timedelta(seconds=0.1), "max_backoff": _PAUSE, "base": 2},
+            },
         )
         return cls(store)
 
@@ -204,10 +214,9 @@ def _reported() -> Iterator[None]:
         log.warning("The object store failed: %s", _first_line(error))
         if any(word in str(error) for word in _FULL):
             raise OSError(errno.ENOSPC, "the object store is full") from error
-        raise Problem(
+        raise StoreAway(
             "The object store cannot be reached, or could not do what was asked.",
             "Check that it runs and AWS_ENDPOINT_URL is right, then try again.",
-            ExitCode.TRY_AGAIN,
         ) from error
 
 
