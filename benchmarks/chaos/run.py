@@ -100,10 +100,7 @@ def run(
         if feeder.fault is not None:
             found.lost.append(feeder.fault)
         digests = _digests(cluster, feeder.jobs)
-        for member in cluster.members:
-            member.process.terminate()
-        for member in cluster.members:
-            member.end()
+        cluster.end(*cluster.members)
         settings = Settings(**{name.lower(): value for name, value in given.items()})
         left = leftovers(cluster, mark, settings)
         return Run(seconds, feeder.jobs, digests, found, kills, feeder.repeated, left)

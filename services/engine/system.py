@@ -150,6 +150,13 @@ def statuses(connection: sa.Connection, database: Database, prefix: str) -> list
     return [(row[0], row[1]) for row in connection.execute(found.order_by(table.c.workflow_uuid))]
 
 
+def first_priority(connection: sa.Connection, database: Database, prefix: str) -> int | None:
+    """The earliest turn that a workflow under a prefix had; None if there is none."""
+    table = workflows(database)
+    found = connection.scalar(sa.select(sa.func.min(table.c.priority)).where(under(table, prefix, database)))
+    return None if found is None else int(found)
+
+
 def status(connection: sa.Connection, database: Database, workflow_id: str) -> str | None:
     """Status of one workflow; None if there is none."""
     table = workflows(database)

@@ -77,7 +77,7 @@ class Begun:
 
 
 class Tasks:
-    """The tasks of all jobs.
+    """The tasks of all jobs. One that is tried again keeps its turn.
 
     Args:
         database: The database.
@@ -242,8 +242,11 @@ class Tasks:
         found: Sequence[events.Event] = (),
         *,
         final: bool,
+        crashed: bool = False,
     ) -> None:
         """A task failed: it is queued again, or quarantined.
+
+        After a first crash it is not delayed: in the meantime its worker would begin another one, which may be long.
 
         Args:
             claim: Of the workflow that did it.
@@ -252,6 +255,7 @@ class Tasks:
             errors: How often it failed before.
             found: Events that come first.
             final: Whether another try would end the same way.
+            crashed: Whether its process ended, rather than its body.
 
         Raises:
             Abandoned: The claim was lost.
@@ -265,7 +269,8 @@ class Tasks:
                 self._quarantine(connection, row, document)
                 return
             again = _event(row, "queued", problem=document.model_dump(mode="json"))
-            self._repeat(connection, place, row, errors + 1, self._retry_seconds * 4.0**errors, again)
+            delay = 0.0 if crashed and not errors else self._retry_seconds * 4.0**errors
+            self._repeat(connection, place, row, errors + 1, delay, again)
 
         self._database.retry(body, PATIENCE_SECONDS)
 
@@ -407,7 +412,10 @@ class Tasks:
     ) -> None:
         prefix, numbers = prefix_of(job.id, job.attempt), dict[str, int]()
         for position, task in queued:
-            if task.role not in numbers:
+            kept = (
+                system.first_priority(connection, self._database, f"{prefix}{position}/") if tried[position] else None
+            )
+            if kept is None and task.role not in numbers:
                 numbers[task.role] = queues.next_priority(connection, self._database, task.role, job.priority, prefix)
             system.enqueue(
                 self._client,
@@ -416,10 +424,11 @@ class Tasks:
                 f"{prefix}{position}/{tried[position]}",
                 task.role,
                 *(job.id, job.attempt, position, errors),
-                priority=numbers[task.role],
+                priority=numbers[task.role] if kept is None else kept,
                 delay=delay,
             )
-            numbers[task.role] += 1
+            if kept is None:
+                numbers[task.role] += 1
 
     def _back(self, connection: sa.Connection, row: sa.Row[Any]) -> None:
         values = {"state": "queued", "executor": None, "progress": None, "finished": None, "problem": None}

@@ -143,7 +143,8 @@ class Worker:
             self._tasks.fail(claim, place, problem, errors, reporter.events(), final=final)
         except problems.TaskError as error:
             log.warning("task failed", task=title, reason=error.problem.title, tries=errors + 1)
-            self._tasks.fail(claim, place, error.problem, errors, reporter.events(), final=False)
+            crashed = isinstance(error, problems.Crashed)
+            self._tasks.fail(claim, place, error.problem, errors, reporter.events(), final=False, crashed=crashed)
         except Exception as error:  # a full disk, a store that does not answer
             log.exception("task failed", task=title, tries=errors + 1)
             unexpected = problems.failed(title, summary_of(error)).problem

@@ -25,6 +25,7 @@ API = "api"
 ROLES = ("jobs", "render", "label", "train")
 ROOT = Path(__file__).resolve().parents[2]
 KEY_NAME = "cluster"
+END_SECONDS = 60.0
 LOG_CHARACTERS = 1500
 """Of a process's log that a failure shows."""
 
@@ -104,12 +105,6 @@ class Member:
         if self.is_running():
             self.process.kill()
         self.process.wait()
-
-    def end(self, seconds: float = 60.0) -> int:
-        """Asks it to end, as a supervisor does; its exit status."""
-        if self.is_running():
-            self.process.terminate()
-        return self.process.wait(seconds)
 
 
 class Cluster:
@@ -216,6 +211,22 @@ class Cluster:
         self.members.remove(member)
         if restart:
             self.begin(member.slot)
+
+    def end(self, *members: Member) -> None:
+        """Asks processes to end, as a supervisor does, and waits until they have."""
+        for member in members:
+            member.process.terminate()
+        for member in members:
+            status = member.process.wait(END_SECONDS)
+            assert status == 0, f"{member.slot.name} ended with {status}\n{member.log.read_text()}"
+
+    def restart(self, *members: Member) -> None:
+        """Asks processes to end, and starts others in their slots once all have."""
+        self.end(*members)
+        for member in members:
+            self.members.remove(member)
+        for begun in [self.begin(member.slot) for member in members]:
+            self.ready(begun)
 
     def of(self, kind: str) -> Member:
         """The oldest process of a kind."""

@@ -76,8 +76,8 @@ class Arena(Cluster):
     def kill(self, member: Member, *, restart: bool = True) -> None:
         """Kills a process; another one of its kind is started, a worker with another disk."""
         self.allowance += member.bodies
-        super().kill(member, restart=False)
-        if restart:
+        super().kill(member, restart=restart and member.kind == API)
+        if restart and member.kind != API:
             self.start(member.kind, wait=False)
 
     def owner(self, line: dict[str, Any]) -> Member:
@@ -178,7 +178,8 @@ class Arena(Cluster):
         return bool(running & {line["pid"], line["parent"]}) and Path(f"/proc/{line['pid']}").exists()
 
     def _slot(self, kind: str) -> Slot:
-        return Slot(API, API, API, self.port) if kind == API else super()._slot(kind)
+        is_first = kind == API and all(member.slot.port != self.port for member in self.members)
+        return Slot(API, API, API, self.port) if is_first else super()._slot(kind)
 
     def _scene(self, name: str) -> str:
         """A scene that was checked, of a file that nobody opens."""
