@@ -22,7 +22,7 @@ from tests.support.settled import Settled, settled
 PROCESSES = (API, API, "jobs", "jobs", "render", "render", "label", "train", "train")
 MACHINES = 2
 """State folders, each with a cache of its own, that the processes share."""
-VARIABLES = {"RATE": "10000", "BURST": "10000", "JOBS": "1000", "DRAIN_SECONDS": "20"}
+VARIABLES = {"RATE": "10000", "BURST": "10000", "JOBS": "1000", "CHECKS_PER_KEY": "2", "DRAIN_SECONDS": "20"}
 """Beside the database's and the store's: all that has to do with recovery is as it comes."""
 ENDED_SECONDS = 900.0
 """Builds that have not ended so long after the last kill are lost."""
