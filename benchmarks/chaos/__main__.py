@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import provenance
-from benchmarks.chaos.builds import FAMILIES, SIZE, STEPS
+from benchmarks.chaos.builds import SIZE, STEPS, families_of
 from benchmarks.chaos.feeder import AT_ONCE
 from benchmarks.chaos.page import page
 from benchmarks.chaos.recovery import counts, recovery
@@ -74,7 +74,7 @@ def figures(calm: Run, stormy: Run, plan: Plan) -> dict[str, Any]:
     return {
         "settings": {
             "builds": len(calm.jobs),
-            "families": min(FAMILIES, len(calm.jobs)),
+            "families": families_of(len(calm.jobs)),
             "size": SIZE,
             "steps": STEPS,
             "builds_at_once": AT_ONCE,

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import Any
 
 from tests.support.cluster import Cluster
 
-FAMILIES = 4
-"""Pairs of scenes; the builds of a pair share what is rendered and labelled, and wait for each other's tasks."""
+BUILDS_OF_FAMILY = 2
+"""At least: builds of the same scenes share what is rendered and labelled, and wait for each other's tasks."""
+MOST_FAMILIES = 10
 SIZE = 64, 48
 STEPS = 20
 _CHECK_SECONDS = 900.0
@@ -39,20 +41,20 @@ def Xform "World"
 """
 
 
-def upload(cluster: Cluster, families: int) -> list[tuple[str, str]]:
+def upload(cluster: Cluster, families: int, scenes: int = 2) -> list[list[str]]:
     """Has the scenes checked by the cluster's workers.
 
     Args:
         cluster: Takes them.
-        families: How many pairs.
+        families: How many sets of scenes.
+        scenes: Of each set.
 
     Returns:
-        Ids of each pair: what is trained on, and what is held out.
+        Ids of each set: the first is trained on, a second one is held out.
     """
-    pairs = [tuple(_scene(cluster, 1.0 + 0.02 * (2 * n + held_out)) for held_out in (0, 1)) for n in range(families)]
-    found = [(first, second) for first, second in pairs]
+    found = [[_scene(cluster, 1.0 + 0.02 * (scenes * n + which)) for which in range(scenes)] for n in range(families)]
     end = time.monotonic() + _CHECK_SECONDS
-    for scene in (scene for pair in found for scene in pair):
+    for scene in (scene for family in found for scene in family):
         while (record := cluster.service.scenes.get(scene)).state == "checking" and time.monotonic() < end:
             time.sleep(0.1)
         if record.state != "accepted":
@@ -60,25 +62,29 @@ def upload(cluster: Cluster, families: int) -> list[tuple[str, str]]:
     return found
 
 
-def spec(pairs: list[tuple[str, str]], number: int) -> dict[str, Any]:
+def families_of(builds: int) -> int:
+    """How many sets of scenes so many builds have."""
+    return min(MOST_FAMILIES, max(1, builds // BUILDS_OF_FAMILY))
+
+
+def spec(families: Sequence[Sequence[str]], number: int) -> dict[str, Any]:
     """A build.
 
     Args:
-        pairs: Ids of scenes.
+        families: Ids of scenes.
         number: Which build.
     """
-    family = number % len(pairs)
-    learnt, held_out = pairs[family]
+    family = number % len(families)
     return {
         "kind": "build",
         "name": f"family-{family}",
-        "scenes": [{"scene": learnt}, {"scene": held_out, "holdout": True}],
+        "scenes": [{"scene": scene, "holdout": index > 0} for index, scene in enumerate(families[family])],
         "alpha": 0.5,
         "budgets": [1.0],
         "views_per_scene": 1,
         "width": SIZE[0],
         "height": SIZE[1],
-        "steps": STEPS + number // len(pairs),
+        "steps": STEPS + number // len(families),
     }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 import httpx
@@ -25,7 +25,7 @@ class Feeder(threading.Thread):
 
     Args:
         cluster: Takes them.
-        pairs: Ids of its scenes.
+        families: Ids of its scenes.
         builds: How many.
         may: Whether the next one may come: its number is given.
 
@@ -38,7 +38,7 @@ class Feeder(threading.Thread):
     def __init__(
         self,
         cluster: Cluster,
-        pairs: list[tuple[str, str]],
+        families: Sequence[Sequence[str]],
         builds: int,
         may: Callable[[int], bool] = lambda number: True,
     ) -> None:
@@ -46,7 +46,7 @@ class Feeder(threading.Thread):
         self.jobs: list[str] = []
         self.repeated = 0
         self.fault: str | None = None
-        self._cluster, self._pairs, self._builds, self._may = cluster, pairs, builds, may
+        self._cluster, self._families, self._builds, self._may = cluster, families, builds, may
         self._open: set[str] = set()
 
     @property
@@ -77,7 +77,7 @@ class Feeder(threading.Thread):
         headers = {"Idempotency-Key": f"build-{number}"}
         try:
             with self._cluster.client(servers[(number + self.repeated) % len(servers)]) as client:
-                answer = client.post("/v1/jobs", json=spec(self._pairs, number), headers=headers)
+                answer = client.post("/v1/jobs", json=spec(self._families, number), headers=headers)
         except (httpx.TransportError, IndexError):
             self.repeated += 1
             return

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from benchmarks.chaos.builds import FAMILIES, upload
+from benchmarks.chaos.builds import families_of, upload
 from benchmarks.chaos.feeder import AT_ONCE, Feeder
 from benchmarks.chaos.leftovers import leftovers
 from benchmarks.chaos.storm import Kill, Storm
@@ -74,6 +74,7 @@ def run(
     plan: Plan | None = None,
     processes: tuple[str, ...] = PROCESSES,
     variables: Mapping[str, str] = {},
+    scenes: int = 2,
 ) -> Run:
     """Has builds done.
 
@@ -85,6 +86,7 @@ def run(
         plan: What happens meanwhile; None: nothing.
         processes: API servers, and workers by their roles.
         variables: Settings that differ from those of a benchmark.
+        scenes: Of each build; the second one is held out.
     """
     mark = f"CHAOS_RUN={uuid.uuid4().hex}"
     given = {**VARIABLES, "DATABASE": postgres.new_database(), "STORE": f"s3://{s3.new_bucket()}/chaos", **variables}
@@ -92,9 +94,9 @@ def run(
     with environment(s3.environment), Cluster(folder, given, own, MACHINES) as cluster:
         warm(cluster.kernels)
         cluster.start(*processes)
-        pairs = upload(cluster, min(FAMILIES, builds))
+        families = upload(cluster, families_of(builds), scenes)
         begun = time.monotonic()
-        feeder, kills = _weather(cluster, postgres, s3, pairs, builds, plan)
+        feeder, kills = _weather(cluster, postgres, s3, families, builds, plan)
         seconds = time.monotonic() - begun
         found, _ = settled(cluster.service, feeder.jobs)
         if feeder.fault is not None:
@@ -107,17 +109,17 @@ def run(
 
 
 def _weather(
-    cluster: Cluster, postgres: Postgres, s3: S3Server, pairs: list[tuple[str, str]], builds: int, plan: Plan | None
+    cluster: Cluster, postgres: Postgres, s3: S3Server, families: list[list[str]], builds: int, plan: Plan | None
 ) -> tuple[Feeder, list[Kill]]:
     """Submits all builds and waits for their end, while what the plan says happens."""
     if plan is None:
-        calm = Feeder(cluster, pairs, builds)
+        calm = Feeder(cluster, families, builds)
         calm.start()
         calm.join(ENDED_SECONDS + 60.0 * builds)
         return calm, []
     storm = Storm(cluster, plan.seed)
     # Kills and builds keep step, so that there is work under way until the last kill.
-    feeder = Feeder(cluster, pairs, builds, lambda number: (number - AT_ONCE) * plan.kills < storm.struck * builds)
+    feeder = Feeder(cluster, families, builds, lambda number: (number - AT_ONCE) * plan.kills < storm.struck * builds)
     outages: list[tuple[int, str, Callable[[], None], Callable[[], None]]] = []
     if plan.away_seconds:
         outages = [
