@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
+from schemas.job import JobKind
 from tests.support.cluster import Cluster
 
 BUILDS_OF_FAMILY = 2
@@ -67,16 +68,17 @@ def families_of(builds: int) -> int:
     return min(MOST_FAMILIES, max(1, builds // BUILDS_OF_FAMILY))
 
 
-def spec(families: Sequence[Sequence[str]], number: int) -> dict[str, Any]:
-    """A build.
+def spec(families: Sequence[Sequence[str]], number: int, kind: JobKind) -> dict[str, Any]:
+    """A build, or the part of one that ends earlier.
 
     Args:
         families: Ids of scenes.
         number: Which build.
+        kind: `build`, or another kind that begins with scenes.
     """
     family = number % len(families)
     return {
-        "kind": "build",
+        "kind": kind,
         "name": f"family-{family}",
         "scenes": [{"scene": scene, "holdout": index > 0} for index, scene in enumerate(families[family])],
         "alpha": 0.5,

@@ -10,7 +10,7 @@ from contextlib import suppress
 import httpx
 
 from benchmarks.chaos.builds import spec
-from schemas.job import FINAL_STATES
+from schemas.job import FINAL_STATES, JobKind
 from tests.support.cluster import API, Cluster
 
 AT_ONCE = 4
@@ -27,6 +27,7 @@ class Feeder(threading.Thread):
         cluster: Takes them.
         families: Ids of its scenes.
         builds: How many.
+        kind: What each job is.
         may: Whether the next one may come: its number is given.
 
     Attributes:
@@ -40,6 +41,7 @@ class Feeder(threading.Thread):
         cluster: Cluster,
         families: Sequence[Sequence[str]],
         builds: int,
+        kind: JobKind = "build",
         may: Callable[[int], bool] = lambda number: True,
     ) -> None:
         super().__init__(daemon=True, name="feeder")
@@ -47,6 +49,7 @@ class Feeder(threading.Thread):
         self.repeated = 0
         self.fault: str | None = None
         self._cluster, self._families, self._builds, self._may = cluster, families, builds, may
+        self._kind: JobKind = kind
         self._open: set[str] = set()
 
     @property
@@ -77,7 +80,7 @@ class Feeder(threading.Thread):
         headers = {"Idempotency-Key": f"build-{number}"}
         try:
             with self._cluster.client(servers[(number + self.repeated) % len(servers)]) as client:
-                answer = client.post("/v1/jobs", json=spec(self._families, number), headers=headers)
+                answer = client.post("/v1/jobs", json=spec(self._families, number, self._kind), headers=headers)
         except (httpx.TransportError, IndexError):
             self.repeated += 1
             return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
 import uuid
 from collections.abc import Callable, Mapping, Sequence
@@ -12,7 +13,9 @@ from benchmarks.chaos.builds import families_of, upload
 from benchmarks.chaos.feeder import AT_ONCE, Feeder
 from benchmarks.chaos.leftovers import leftovers
 from benchmarks.chaos.storm import Kill, Storm
+from schemas.job import JobKind
 from services.settings import Settings
+from services.store import canonical_json, read_meta
 from tests.support.cluster import API, Cluster
 from tests.support.kernels import warm
 from tests.support.postgres import Postgres
@@ -35,7 +38,7 @@ class Run:
     Attributes:
         seconds: From the first submission to the last end.
         jobs: Ids, in order.
-        digests: Of each build's bundle, in order; None: it has none.
+        digests: Of each build's bundle or labels, in order; None: it has none.
         settled: What was found.
         kills: Faults.
         repeated: Requests that had to be sent again.
@@ -75,6 +78,7 @@ def run(
     processes: tuple[str, ...] = PROCESSES,
     variables: Mapping[str, str] = {},
     scenes: int = 2,
+    kind: JobKind = "build",
 ) -> Run:
     """Has builds done.
 
@@ -87,6 +91,7 @@ def run(
         processes: API servers, and workers by their roles.
         variables: Settings that differ from those of a benchmark.
         scenes: Of each build; the second one is held out.
+        kind: `build`, or `label`: a build that ends when its labels are made.
     """
     mark = f"CHAOS_RUN={uuid.uuid4().hex}"
     given = {**VARIABLES, "DATABASE": postgres.new_database(), "STORE": f"s3://{s3.new_bucket()}/chaos", **variables}
@@ -96,12 +101,12 @@ def run(
         cluster.start(*processes)
         families = upload(cluster, families_of(builds), scenes)
         begun = time.monotonic()
-        feeder, kills = _weather(cluster, postgres, s3, families, builds, plan)
+        feeder, kills = _weather(cluster, postgres, s3, families, builds, plan, kind)
         seconds = time.monotonic() - begun
         found, _ = settled(cluster.service, feeder.jobs)
         if feeder.fault is not None:
             found.lost.append(feeder.fault)
-        digests = _digests(cluster, feeder.jobs)
+        digests = _labels(cluster, feeder.jobs) if kind == "label" else _bundles(cluster, feeder.jobs)
         cluster.end(*cluster.members)
         settings = Settings(**{name.lower(): value for name, value in given.items()})
         left = leftovers(cluster, mark, settings)
@@ -109,17 +114,24 @@ def run(
 
 
 def _weather(
-    cluster: Cluster, postgres: Postgres, s3: S3Server, families: list[list[str]], builds: int, plan: Plan | None
+    cluster: Cluster,
+    postgres: Postgres,
+    s3: S3Server,
+    families: list[list[str]],
+    builds: int,
+    plan: Plan | None,
+    kind: JobKind,
 ) -> tuple[Feeder, list[Kill]]:
     """Submits all builds and waits for their end, while what the plan says happens."""
     if plan is None:
-        calm = Feeder(cluster, families, builds)
+        calm = Feeder(cluster, families, builds, kind)
         calm.start()
         calm.join(ENDED_SECONDS + 60.0 * builds)
         return calm, []
     storm = Storm(cluster, plan.seed)
     # Kills and builds keep step, so that there is work under way until the last kill.
-    feeder = Feeder(cluster, families, builds, lambda number: (number - AT_ONCE) * plan.kills < storm.struck * builds)
+    in_step: Callable[[int], bool] = lambda number: (number - AT_ONCE) * plan.kills < storm.struck * builds  # noqa: E731
+    feeder = Feeder(cluster, families, builds, kind, in_step)
     outages: list[tuple[int, str, Callable[[], None], Callable[[], None]]] = []
     if plan.away_seconds:
         outages = [
@@ -141,7 +153,7 @@ def _weather(
     return feeder, storm.kills
 
 
-def _digests(cluster: Cluster, job_ids: Sequence[str]) -> list[str | None]:
+def _bundles(cluster: Cluster, job_ids: Sequence[str]) -> list[str | None]:
     """Digest of the bundle that each job published."""
     registry, found = cluster.service.registry, dict[str, str]()
     for name in {str(cluster.service.jobs.get(job_id).name) for job_id in job_ids}:
@@ -149,3 +161,15 @@ def _digests(cluster: Cluster, job_ids: Sequence[str]) -> list[str | None]:
             if record.job_id is not None:
                 found[record.job_id] = record.digest
     return [found.get(job_id) for job_id in job_ids]
+
+
+def _labels(cluster: Cluster, job_ids: Sequence[str]) -> list[str | None]:
+    """Digest of all files of the labels that each job made."""
+    found: list[str | None] = []
+    for job_id in job_ids:
+        digest = hashlib.sha256()
+        for task in cluster.service.jobs.tasks(job_id, stage="label"):
+            files = read_meta(cluster.service.storage.store.fetch(task.artifact), task.artifact)["files"]
+            digest.update(canonical_json({name: file["sha256"] for name, file in files.items()}).encode())
+        found.append(digest.hexdigest())
+    return found

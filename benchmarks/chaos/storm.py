@@ -145,7 +145,7 @@ class Storm:
         members = [m for m in self._cluster.members if m.is_running() and m.is_ready()]
         if kind == API:
             return self._kill_api([member for member in members if member.kind == API])
-        chosen = [m for m in members if m.kind != API and (m.kind != "jobs" if kind == "child" else m.kind == kind)]
+        chosen = [member for member in members if _does(member, kind)]
         self._random.shuffle(chosen)
         for member in chosen:
             if kind == "child":
@@ -174,7 +174,7 @@ class Storm:
         member.kill()
         workflows |= watch.claimed(database, executor)
         self._hits.update(task.place for task in held)
-        doing = "idle" if not workflows else member.kind if member.kind == "jobs" else _stages(held)
+        doing = "idle" if not workflows else _stages(held) if held else "jobs"
         self._add(Kill(member.kind, doing, begun, lambda: watch.are_taken_over(database, workflows, executor)))
         return True
 
@@ -217,6 +217,12 @@ class Storm:
                         kill.seconds = passed
                 if kill.seconds is not None or passed > LONGEST_SECONDS:
                     self._open.remove(kill)
+
+
+def _does(member: Member, kind: str) -> bool:
+    """Whether a process is a worker of a role, or of any that has children."""
+    roles = set() if member.kind == API else set(member.kind.split(","))
+    return bool(roles - {"jobs"}) if kind == "child" else kind in roles
 
 
 def _executor_of(member: Member) -> str:

@@ -9,6 +9,9 @@ from dataclasses import dataclass, field
 from services.service import Service
 from services.store import MissingArtifact
 
+PUBLISHING = ("build", "train")
+"""Kinds of jobs that end with a version."""
+
 
 @dataclass
 class Settled:
@@ -88,6 +91,7 @@ def _look_at_versions(service: Service, job_ids: Sequence[str], found: Settled) 
         if job.state != "succeeded":
             detail = "" if job.problem is None else job.problem.detail
             found.lost.append(f"{job.id} {job.state} at attempt {job.attempt}: {detail}")
+    jobs = [job for job in jobs if job.kind in PUBLISHING]
     registry, mine = service.registry, set(job_ids)
     for name in sorted({str(job.name) for job in jobs}):
         records = [registry.record(publication) for publication in registry.versions(name)]
