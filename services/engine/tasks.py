@@ -269,7 +269,8 @@ class Tasks:
                 self._quarantine(connection, row, document)
                 return
             again = _event(row, "queued", problem=document.model_dump(mode="json"))
-            delay = 0.0 if crashed and not errors else self._retry_seconds * 4.0**errors
+            waits = errors - 1 if crashed else errors
+            delay = self._retry_seconds * 4.0**waits if waits >= 0 else 0.0
             self._repeat(connection, place, row, errors + 1, delay, again)
 
         self._database.retry(body, PATIENCE_SECONDS)
