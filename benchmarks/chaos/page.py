@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections import Counter
 from collections.abc import Mapping
 from typing import Any
@@ -58,7 +59,7 @@ def page(found: Figures) -> str:
 def _about(settings: Figures) -> str:
     counted: Counter[str] = Counter(settings["processes"])
     width, height = settings["size"]
-    return _ABOUT.format(
+    text = _ABOUT.format(
         builds=settings["builds"],
         families=settings["families"],
         width=width,
@@ -70,6 +71,7 @@ def _about(settings: Figures) -> str:
         ttl=settings["ttl_seconds"],
         away=settings["away_seconds"],
     )
+    return "\n\n".join(textwrap.fill(paragraph, 120) for paragraph in text.split("\n\n"))
 
 
 def _results(found: Figures) -> list[tuple[Any, ...]]:
