@@ -32,8 +32,9 @@ settings.load_profile("diaphane")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """`--golden` writes the golden pictures anew."""
+    """`--golden` writes the golden pictures anew; `--examples` asks the API longer than a run of all tests may."""
     parser.addoption("--golden", action="store_true", help="write the golden pictures anew")
+    parser.addoption("--examples", type=int, default=4, help="requests that schemathesis makes of an operation")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
