@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.account.ledger import count_frame
 from renderer.exact_bytes import exact_bytes, fits
 from renderer.techniques import TECHNIQUES, Budget, Needs, Rendered, Technique, technique
 from schemas.bench import LOSSLESS, BenchCell, CellKey, Yardstick
 from schemas.problem import ExitCode, Problem
 from schemas.tail import DENSITY_G, TailName
-from schemas.work import PassWork
 from services.bench.cells import FIXED, Bundle, fragments_within
 from services.bench.flicker import measure_flicker
 from services.bench.options import BenchOptions
@@ -66,17 +64,12 @@ class Bench:
             self._cells[run.key] = self._cells[run.key].model_copy(update=times)
         if self.options.account:
             for run in timed:
-                self._cells[run.key] = self._cells[run.key].model_copy(update={"work": self._work(run)})
+                self._cells[run.key] = self._cells[run.key].model_copy(update={"work": run.work(self.subject)})
         if self.options.path:
             for key, found in measure_flicker(self.subject, timed, self.options.path).items():
                 update = {"flicker": found.colour, "flicker_k": found.k}
                 self._cells[key] = self._cells[key].model_copy(update=update)
         return list(self._marks.values()), [self._cells[key] for key in keys]
-
-    def _work(self, run: Run) -> dict[str, PassWork]:
-        """What one more frame does, counted."""
-        frame = self.subject.frame()
-        return count_frame(self.subject.gpu, lambda: run.technique.render(frame, run.budget))
 
     def _measure_yardsticks(self, keys: Sequence[CellKey]) -> None:
         tails = dict.fromkeys((key.tail, key.g) for key in keys if key.tail is not None)
