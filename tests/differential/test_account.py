@@ -9,8 +9,8 @@ import moderngl
 import numpy as np
 import pytest
 from support.scenes import SIZE, VIEW, shells
+from support.training import random_weights, write_unproven
 
-from benchmarks.comparing.scenes import BUNDLE
 from renderer.account.glsl import BINDING, LOADED
 from renderer.account.ledger import count_frame
 from renderer.account.programs import TalliedPrograms
@@ -18,16 +18,15 @@ from renderer.capture import capture
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.techniques import TECHNIQUES, Budget, Needs, Rendered, technique
+from renderer.techniques.binned import DEFAULT_BINS
 from renderer.techniques.ordered import capture_ordered
 from renderer.tiles import TILE
-from schemas.bundle import load_manifest
 from schemas.fragments import FragmentDump
-from schemas.tail import TAILS
+from schemas.tail import DEFAULT_TAIL, TAILS, TailName
 from schemas.work import Device, PassWork, total_work
 
 SLOTS = 2
 """Of every pixel in `kbuffer`."""
-TAIL = load_manifest(BUNDLE).tail.name
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,12 +82,13 @@ def counts(gpu: GpuScene) -> Counts:
 
 
 @pytest.fixture(scope="module")
-def frames(gpu: GpuScene, counts: Counts) -> dict[str, Counted]:
+def frames(gpu: GpuScene, counts: Counts, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Counted]:
     """Every technique's."""
     made = {}
+    bundle = write_unproven(tmp_path_factory.mktemp("bundles") / "random", random_weights(5))
     k = np.minimum(counts.dump.counts, SLOTS).astype(np.int32)
     for name in TECHNIQUES:
-        needs, budget = Needs(BUNDLE, lambda *_: k), Budget(SLOTS * counts.dump.pixels, TAIL, chain="two-pass")
+        needs, budget = Needs(bundle, lambda *_: k), Budget(SLOTS * counts.dump.pixels, chain="two-pass")
         plain = technique(name, needs).render(Frame(gpu, VIEW, *SIZE), budget)
         frame, rendered = Frame(gpu, VIEW, *SIZE), []
         again = technique(name, needs)
@@ -157,11 +157,16 @@ def resolved(counts: Counts, name: str) -> dict[str, int]:
         "weighted-average": 4 * pixels + 16 * occupied,
         "weighted-blended": 16 * pixels + 4 * occupied,
         "stochastic": 16 * pixels + 4 * occupied,
-        "binned": 16 * pixels + 4 * occupied,
+        "binned": sums_of(DEFAULT_BINS) * (4 * pixels + occupied) // 5,
         "moment": 16 * counts.in_tiles + 4 * occupied,
     }[name]
     stored = 8 * counts.deep if name == "sbuffer" else 0
     return {"pixels": pixels, "loaded_bytes": 4 * pixels + loaded, "stored_bytes": 16 * pixels + stored}
+
+
+def sums_of(tail: TailName) -> int:
+    """Bytes of a pixel of a tail's sums: four of five are of weighted colours."""
+    return TAILS[tail].sum_bytes
 
 
 def blended(fragments: int, target_bytes: int, loaded: int, cleared: int) -> dict[str, int]:
@@ -213,23 +218,19 @@ def closed_forms(counts: Counts, found: Counted, name: str) -> dict[str, dict[st
             "resolve": {"pixels": pixels, "blended_bytes": 32 * pixels},
         }
     if name == "binned":
-        kept = TAILS["binned-16"].kept_bytes
-        return {
-            "tail": blended(shaded, 20, (8 + kept) * total, 20 * pixels),
-            "resolve": resolved(counts, name),
-        }
+        tail = {"blended_bytes": 2 * sums_of(DEFAULT_BINS) * shaded, "cleared_bytes": sums_of(DEFAULT_BINS) * pixels}
+        return {"tail": {**tail, "stored_bytes": 0, "atomics": 0}, "resolve": resolved(counts, name)}
     captured = int(found.counted.captured)
-    kept = TAILS[TAIL].kept_bytes
+    tail = {"blended_bytes": 2 * sums_of(DEFAULT_TAIL) * shaded}
     if TECHNIQUES[name].needs_bundle:
         return {
             "capture": {
-                **{"blended_bytes": 40 * shaded, "atomics": captured, "stored_bytes": 8 * captured},
-                # Range and cut of every fragment; range and bins once more of those of the tail.
-                **{"loaded_bytes": 12 * total + (8 + kept) * (total - captured), "cleared_bytes": 20 * pixels},
+                **{**tail, "atomics": captured, "stored_bytes": 8 * captured},
+                "cleared_bytes": sums_of(DEFAULT_TAIL) * pixels,
             },
             "resolve": {"pixels": pixels},
         }
-    forms = {"count": {**with_range, "transferred_bytes": 4 * pixels}, "chain-colour": {"blended_bytes": 40 * shaded}}
+    forms = {"count": {**with_range, "transferred_bytes": 4 * pixels}, "chain-colour": tail}
     if name == "kbuffer-importance":
         forms["facing"] = {"loaded_bytes": 4 * total, "atomics": counts.nearest, "cleared_bytes": 4 * pixels}
     return forms
