@@ -7,6 +7,13 @@ from dataclasses import dataclass
 
 from schemas.bench import BenchCell, BenchView
 from schemas.work import Device, PassWork, total_work
+from services.summary import number
+
+COLUMNS = (
+    *("geometry passes", "shaded / pixel", "B / pixel", "blended", "loaded", "stored", "cleared", "atomics / pixel"),
+    *("B / fragment", "atomics / fragment", "bound, ms"),
+)
+"""Of a table; bytes by kind are a pixel's, too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +49,17 @@ class Account:
     def a_fragment(self, amount: int) -> float:
         """An amount over the transparent fragments."""
         return amount / max(self.fragments, 1)
+
+    def columns(self, device: Device) -> list[str]:
+        """Cells of `COLUMNS`."""
+        work = self.total
+        moved = (work.moved_bytes, work.blended_bytes, work.loaded_bytes, work.stored_bytes, work.cleared_bytes)
+        amounts = [
+            *(work.geometry_passes / self.views, self.a_pixel(work.shaded), *map(self.a_pixel, moved)),
+            *(self.a_pixel(work.atomics), self.a_fragment(work.moved_bytes), self.a_fragment(work.atomics)),
+            self.bound(device),
+        ]
+        return [number(amount) for amount in amounts]
 
 
 def account_of(found: Sequence[tuple[BenchView, BenchCell]]) -> Account | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from schemas.work import Device
-from services.bench.account import Account, said_device
+from services.bench.account import COLUMNS, said_device
 from services.bench.groups import Group, Row, offline, said_budget, said_technique
 from services.cli.lines import print_columns, size
 from services.summary import MSE_FLOOR, UNFIT, number, said_unfit
@@ -58,29 +58,14 @@ def show(shown: Group, device: Device) -> None:
 
 def _show_work(shown: Group, device: Device) -> None:
     print(f"\nwork of a frame, counted; bound: its least time without caches at {said_device(device)}, no prediction")
-    headings = ("technique", "budget", "geometry passes", "shaded/px", "B/px", "blended", "loaded", "stored", "cleared")
     print_columns(
-        (*headings, "atomics/px", "B/fragment", "atomics/fragment", "bound, ms"),
+        ("technique", "budget", *COLUMNS),
         [
-            [said_technique(row.key), said_budget(row.key), *_work(row.account, device)]
+            [said_technique(row.key), said_budget(row.key), *row.account.columns(device)]
             for row in shown.rows
             if row.account
         ],
     )
-
-
-def _work(found: Account, device: Device) -> list[str | None]:
-    work = found.total
-    bytes_ = (work.moved_bytes, work.blended_bytes, work.loaded_bytes, work.stored_bytes, work.cleared_bytes)
-    return [
-        number(work.geometry_passes / found.views),
-        number(found.a_pixel(work.shaded)),
-        *(number(found.a_pixel(amount)) for amount in bytes_),
-        number(found.a_pixel(work.atomics)),
-        number(found.a_fragment(work.moved_bytes)),
-        number(found.a_fragment(work.atomics)),
-        number(found.bound(device)),
-    ]
 
 
 def _cells(row: Row, with_path: bool) -> list[str | None]:

@@ -11,8 +11,10 @@ from xml.etree import ElementTree
 import pytest
 from support.bench import cell, view
 
+from benchmarks.comparing.work import work as work_table
 from schemas.bench import BenchResult, Times
 from schemas.work import Device, PassWork
+from services.bench.account import COLUMNS
 from services.bench.bars import error_bars
 from services.bench.groups import group, groups_of, offline
 from services.bench.page import charts_of, page
@@ -67,7 +69,11 @@ def test_an_account_is_over_the_views_that_were_counted() -> None:
     device = Device(bandwidth=1.0, fill_rate=0.01)
     assert account.bound(device) == pytest.approx(0.04 + 0.01)
     assert account.bound(device, "resolve") == pytest.approx(0.01)
+    assert account.columns(device)[:4] == ["1.00", "5.00", "160", "160"]
+    assert len(account.columns(device)) == len(COLUMNS)
     assert group("", VIEWS).rows[0].account is None
+    assert "| moment | 1.00 | 5.00 | 160 | 160 |" in work_table(views, 2.0, device)
+    assert work_table(VIEWS, 2.0, device) == ""
 
 
 def test_a_group_is_as_deep_as_its_views_are_on_average() -> None:
