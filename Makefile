@@ -16,7 +16,7 @@ setup: ## virtual environment, dependencies, OpenGL
 
 quickstart: setup ## sample scenes, then the main job on them; prints where the report is
 	$(BIN)/diaphane samples samples
-	$(BIN)/diaphane build samples/*.usd* --budgets 1,2,4 --name quickstart $(addprefix --holdout ,$(HOLDOUT)) $(ARGS)
+	$(BIN)/diaphane build samples/*.usd* --name quickstart $(addprefix --holdout ,$(HOLDOUT)) $(ARGS)
 
 bench: setup ## every technique on the committed suite; goes on where it stopped (hours; ARGS="--quick": minutes)
 	$(BIN)/python -m benchmarks.suite $(ARGS)

@@ -24,12 +24,13 @@ import moderngl
 
 from benchmarks import provenance
 from benchmarks.casting.cases import SHARED
+from benchmarks.comparing.measured import RESULTS
 from benchmarks.comparing.scenes import BUNDLE
 from benchmarks.graphics.checking import TOLERANCE, Check, checked, why
 from benchmarks.graphics.measuring import Measuring, said
 from benchmarks.graphics.plan import BUDGETS, PLAN, SIZE, Planned, planned
 from benchmarks.outputs import write_figures
-from benchmarks.suite import RESULTS, label
+from benchmarks.suite import label
 from renderer.context import describe, gl_context
 from renderer.techniques import Needs
 from renderer.timing import timers_are_right

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from schemas.bundle import Provenance
 from schemas.pixel_weights import DEFAULT_WEIGHTS
 from schemas.problem import ExitCode, Problem
 from schemas.service import DatasetRecord
@@ -98,6 +99,7 @@ def begin_with(plan: Plan, own: Own, reference: str, replay: bool, registry: Reg
         start=source_of_version(version),
         replayed=tuple((shard.scene, shard.artifact) for shard in again),
         learned=learned,
+        licences=Provenance.model_validate(version.provenance).known_licences,
     )
     return Begun(begun, tuple(lost) if replay else ())
 

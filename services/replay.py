@@ -67,7 +67,7 @@ def fine_tuning(
     if options.start is not None:
         source, manifest = _bundle(options.start, registry)
         seen |= manifest.provenance.scenes
-        plan = replace(plan, start=source)
+        plan = replace(plan, start=source, licences=manifest.provenance.known_licences)
         if manifest.hidden != TrainConfig.sized(plan.network).hidden:
             units = "-".join(map(str, manifest.hidden))
             progress.note(

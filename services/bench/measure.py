@@ -73,9 +73,9 @@ class Bench:
 
     def _measure_yardsticks(self, keys: Sequence[CellKey]) -> None:
         tails = dict.fromkeys((key.tail, key.g) for key in keys if key.tail is not None)
-        found = self.subject.yardsticks("greedy", ORACLE_TAIL, DENSITY_G, self.options.budgets)
+        found = self.subject.yardsticks("greedy", ORACLE_TAIL, DENSITY_G, self.options.factors)
         for tail, g in tails:
-            found += self.subject.yardsticks("optimal", tail, DENSITY_G if g is None else g, self.options.budgets)
+            found += self.subject.yardsticks("optimal", tail, DENSITY_G if g is None else g, self.options.factors)
         self._marks = {(mark.rule, mark.tail, mark.g, mark.budget_factor): mark for mark in found}
 
     def _pictured(self, key: CellKey) -> BenchCell:

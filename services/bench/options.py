@@ -18,7 +18,6 @@ AUTHORED = "authored"
 """The word for the materials' own opacity."""
 DEFAULT_SIZE = (1430, 960)
 """DHOIT's."""
-DEFAULT_BUDGETS = (1.0, 2.0, 4.0)
 MOST_FRAMES = 1000
 MOST_REPEATS = 1000
 
@@ -31,7 +30,8 @@ class BenchOptions:
         scenes: Files.
         techniques: Names, see `services.render_options.parse_techniques`.
         out: Folder of the results.
-        budgets: F as multiples of width * height.
+        budgets: F as multiples of width * height; None: for each scene and opacity what its views call for
+            (`labeller.budgets`).
         alphas: Opacities that every surface gets, one run each; None: the materials' own.
         sizes: Widths and heights, one run each.
         tails: Of the bounded techniques; those that need a bundle always have its tail. Empty: the usual one.
@@ -59,7 +59,7 @@ class BenchOptions:
     scenes: tuple[Path, ...]
     techniques: tuple[str, ...]
     out: Path
-    budgets: tuple[float, ...] = DEFAULT_BUDGETS
+    budgets: tuple[float, ...] | None = None
     alphas: tuple[float | None, ...] = (None,)
     sizes: tuple[tuple[int, int], ...] = (DEFAULT_SIZE,)
     tails: tuple[TailName, ...] = ()
@@ -88,7 +88,7 @@ class BenchOptions:
         for name in names:
             if names.count(name) > 1:
                 raise Problem(f"{names.count(name)} scenes are called {name}.", "Give each file a name of its own.")
-        if not 1 <= len(self.budgets) <= LIMITS.budgets:
+        if self.budgets is not None and not 1 <= len(self.budgets) <= LIMITS.budgets:
             raise Problem(f"{len(self.budgets)} budgets are not possible.", f"Give 1 to {LIMITS.budgets}.")
         for side in (side for size in self.sizes for side in size):
             if not LIMITS.min_side <= side <= LIMITS.max_side:
@@ -100,8 +100,8 @@ class BenchOptions:
             if width * height > LIMITS.pixels:
                 raise Problem(f"--size {width}x{height} is too large.", f"Give at most {LIMITS.pixels:,} pixels.")
         smallest = min(self.sizes, key=lambda size: size[0] * size[1])
-        for budget in self.budgets:
-            check_budget(budget, "--budgets 1,2,4", smallest)
+        for budget in self.budgets or ():
+            check_budget(budget, "--budgets .5,1,2", smallest)
         _in_range("--repeats", self.repeats, 1, MOST_REPEATS)
         _in_range("--most-views", self.most_views, 1, LIMITS.views)
         if self.path:
@@ -116,6 +116,12 @@ class BenchOptions:
             if TECHNIQUES[name].family == "approximate":
                 technique(name, self.needs)  # refuses nodes and samples that it cannot work with
 
+    @property
+    def factors(self) -> tuple[float, ...]:
+        """The budgets, once they are decided."""
+        assert self.budgets is not None, "budgets are decided once the views are counted"
+        return self.budgets
+
 
 def parse_budgets(text: str) -> tuple[float, ...]:
     """Multiples of width * height, ascending, without duplicates.
@@ -126,7 +132,7 @@ def parse_budgets(text: str) -> tuple[float, ...]:
     Raises:
         Problem: It has something else.
     """
-    return tuple(sorted({_number(part, "--budgets", "1,2,4") for part in _parts(text, "--budgets", "1,2,4")}))
+    return tuple(sorted({_number(part, "--budgets", ".5,1,2") for part in _parts(text, "--budgets", ".5,1,2")}))
 
 
 def parse_device(bandwidth: float, fill_rate: float) -> Device:

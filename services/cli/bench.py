@@ -14,6 +14,7 @@ from services.cli import output
 from services.cli.scene_options import CameraOption, ComplexityOption, RefineOption, VariantOption
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
 from services.cli.technique_options import (
+    BudgetsOption,
     InferenceOption,
     NodesOption,
     SamplesOption,
@@ -32,7 +33,7 @@ def bench(
         typer.Option("--out", "-o", help="Folder of the results: JSON lines, JSON, Vega-Lite plots, an HTML page."),
     ],
     techniques: Annotated[str, typer.Option("--techniques", "-t", help="Names with commas between, or all.")] = "all",
-    budgets: Annotated[str, typer.Option("--budgets", help="Fragments, as multiples of width x height.")] = "1,2,4",
+    budgets: BudgetsOption = None,
     alpha: Annotated[
         str | None,
         typer.Option(
@@ -108,7 +109,7 @@ def bench(
         scenes=tuple(files),
         techniques=parse_techniques([techniques], bundle is not None),
         out=out,
-        budgets=parse_budgets(budgets),
+        budgets=None if budgets is None else parse_budgets(budgets),
         alphas=parse_alphas(alpha),
         sizes=parse_sizes(picture_size),
         tails=() if tails is None else parse_tails(tails),

@@ -51,6 +51,7 @@ def _description(task: Task, trained: Facts, views: int) -> Description:
         provenance=Provenance(
             scenes=params["scenes"],
             holdout=params["holdout"],
+            licences=params["licences"],
             code_version=params["code"],
             seed=settings["seed"],
             machine=", ".join(machine().values()),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
 
+from schemas.bundle import network_digest
 from schemas.pixel_weights import DEFAULT_WEIGHTS
 from schemas.tail import MetricName
 from schemas.view import View
@@ -23,7 +24,7 @@ _REPLAYED = ":replayed"
 
 _SOURCES: Mapping[StageName, tuple[str, ...]] = {
     "scene": (
-        *("schemas.scene", "schemas.view", "schemas.colour"),
+        *("schemas.scene", "schemas.view", "schemas.colour", "schemas.licence"),
         *("renderer.scene", "renderer.usd", "renderer.views", "renderer.convert", "renderer.authoring"),
         "services.stages.scenes",
     ),
@@ -205,7 +206,9 @@ def trained_on(inputs: Sequence[str]) -> list[TrainedOn]:
     return found
 
 
-def export_task(plan: Plan, train: Task, scenes: Mapping[str, str], held_out: Mapping[str, str]) -> Task:
+def export_task(
+    plan: Plan, train: Task, scenes: Mapping[str, str], held_out: Mapping[str, str], licences: Mapping[str, str]
+) -> Task:
     """Writes the bundle, if its three forms agree.
 
     Args:
@@ -213,6 +216,7 @@ def export_task(plan: Plan, train: Task, scenes: Mapping[str, str], held_out: Ma
         train: The training.
         scenes: Label -> digest of what was trained on.
         held_out: Label -> digest of what was not.
+        licences: Label -> licence of all of them, as far as they are known.
     """
     return Task(
         name=plan.name,
@@ -223,6 +227,7 @@ def export_task(plan: Plan, train: Task, scenes: Mapping[str, str], held_out: Ma
             "name": plan.name,
             "scenes": dict(scenes),
             "holdout": dict(held_out),
+            "licences": dict(licences),
             "settings": plan.settings,
             "code": training_version(),
         },
@@ -251,7 +256,7 @@ def evaluate_task(
         name=f"{view.rendered.title} {'published ' if published else ''}{kind}",
         stage="evaluate",
         version=version_of("evaluate"),
-        inputs=(*made_from, bundle.digest) if bundle is not None else tuple(made_from),
+        inputs=(*made_from, _network(bundle)) if bundle is not None else tuple(made_from),
         params={
             "kind": kind,
             **_picture(plan, view.rendered.view),
@@ -289,6 +294,11 @@ def report_task(name: str, data: Mapping[str, Any], evaluations: Sequence[tuple[
         params={"data": dict(data), "labels": [label for label, _ in evaluations]},
         needs=tuple(task.artifact for _, task in evaluations),
     )
+
+
+def _network(bundle: Source) -> str:
+    """Names the network of a bundle: its pictures are the same before and after it has a model card."""
+    return network_digest(bundle.files) if bundle.files else bundle.digest
 
 
 def _picture(plan: Plan, view: View) -> dict[str, Any]:
