@@ -18,7 +18,7 @@ from schemas.service import DatasetRecord
 from services.fine_tuning import check_labels, is_replayed, refuse_known, scenes_of
 from services.plan import Plan, source_of_version
 from services.registry import Registry
-from services.stages.tasks import METRIC, trained_on
+from services.stages.inputs import METRIC, trained_on
 from services.store import Address, MissingArtifact, Store
 
 _SETTINGS = ("tail", "g", "metric", "seed", "weights")

@@ -19,7 +19,7 @@ from services.options import BuildOptions
 from services.plan import Plan, source_of_version
 from services.progress import Progress
 from services.registry import Registry, bundle_digest
-from services.stages.tasks import METRIC
+from services.stages.inputs import METRIC
 from services.tasks import Source
 from trainer.config import TrainConfig
 

@@ -36,6 +36,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--golden", action="store_true", help="write the golden pictures anew")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Marks the tests that need a program which `make setup` does not install: `make check` leaves them out."""
+    for item in items:
+        wanted = set(getattr(item, "fixturenames", ()))
+        given = getattr(item, "callspec", None)
+        if wanted & {"chromium", "postgres"} or (given is not None and "postgresql" in given.params.values()):
+            item.add_marker(pytest.mark.installed)
+
+
 @pytest.fixture(scope="module")
 def single_thread() -> Iterator[None]:
     """For thousands of tiny calls: threads of compiled code would only wait for each other."""

@@ -85,7 +85,7 @@ def submit(
 ) -> None:
     """Submit a job; local scenes are uploaded as far as the server lacks them."""
     from services.cli.inputs import bring, named_scenes, scene_uses, with_licences
-    from services.cli.jobs import show_job
+    from services.cli.job_text import show_job
     from services.cli.watching import ensure_success, follow
 
     fields = job_fields(

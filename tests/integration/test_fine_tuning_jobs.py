@@ -12,7 +12,7 @@ import pytest
 from support.chaos.arena import API, Arena
 from support.postgres import Postgres
 
-from services.stages.tasks import TrainedOn, trained_on
+from services.stages.inputs import TrainedOn, trained_on
 
 
 @pytest.fixture(scope="module", params=["sqlite", "postgresql"])

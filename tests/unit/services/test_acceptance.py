@@ -28,7 +28,8 @@ from services.plan import Plan, plan_of_job
 from services.registry import Registry, open_registry
 from services.retention import DAY, sweep
 from services.settings import Settings
-from services.stages.tasks import METRIC, train_task, trained_on
+from services.stages.inputs import METRIC, trained_on
+from services.stages.tasks import train_task
 from services.storage import Blobs, Storage
 from services.store import Address, Store
 
