@@ -6,10 +6,10 @@ ARGS ?=
 # The scenes that the result is judged by, and that are never trained on.
 HOLDOUT ?= bottles foliage
 
-.PHONY: help setup setup-tests quickstart bench check check-tests test lint format lock clean
+.PHONY: help setup setup-tests quickstart bench bench-gpu check check-tests test lint format lock clean
 
 help: ## this list
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
 
 setup: ## virtual environment, dependencies, OpenGL
 	@scripts/setup.sh
@@ -20,6 +20,9 @@ quickstart: setup ## sample scenes, then the main job on them; prints where the 
 
 bench: setup ## every technique on the committed suite; goes on where it stopped (hours; ARGS="--quick": minutes)
 	$(BIN)/python -m benchmarks.suite $(ARGS)
+
+bench-gpu: setup ## this machine's graphics card in ten minutes, unattended: one file for benchmarks/results
+	$(BIN)/python -m benchmarks.gpu $(ARGS)
 
 lint: setup ## style, types, direction of imports
 	$(BIN)/ruff check .

@@ -159,6 +159,7 @@ def _options(part: Part, arguments: argparse.Namespace, work: Path) -> BenchOpti
         most_views=arguments.views,
         variants=part.case.variants,
         path=part.path,
+        account=part.size == SIZES[0],
         repeats=arguments.repeats,
         limit=arguments.limit,
     )

@@ -11,6 +11,7 @@ from renderer.techniques import TECHNIQUES, Needs, technique
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 from schemas.tail import TailName
+from schemas.work import Device
 from services.options import check_budget, check_bundle, check_steepness, parse_size, parse_tail
 
 AUTHORED = "authored"
@@ -45,6 +46,8 @@ class BenchOptions:
         equal_memory: Whether bounded techniques are also measured at equal total bytes.
         path: Frames of the camera path that flicker is measured on; 0: none.
         repeats: Timed frames of each cell, after a warm-up.
+        account: Whether a frame of each cell is counted (`renderer.account`).
+        device: What bounds of frame times are stated for.
         limit: Seconds that the repeats of one cell may take; what takes longer by itself is timed once.
         resume: Whether cells that were measured into `out` already are kept.
         state: Folder of the registry.
@@ -71,6 +74,8 @@ class BenchOptions:
     equal_memory: bool = True
     path: int = 0
     repeats: int = 3
+    account: bool = True
+    device: Device = field(default_factory=Device)
     limit: float = 10.0
     resume: bool = True
     state: Path = Path(".diaphane")
@@ -128,6 +133,22 @@ def parse_budgets(text: str) -> tuple[float, ...]:
         Problem: It has something else.
     """
     return tuple(sorted({_number(part, "--budgets", ".5,1,2") for part in _parts(text, "--budgets", ".5,1,2")}))
+
+
+def parse_device(bandwidth: float, fill_rate: float) -> Device:
+    """What bounds of frame times are stated for.
+
+    Args:
+        bandwidth: GB/s.
+        fill_rate: Gfragments/s.
+
+    Raises:
+        Problem: One of them is not above 0.
+    """
+    for option, value in (("--bandwidth", bandwidth), ("--fill-rate", fill_rate)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise Problem(f"{option} {value:g} cannot be used.", "Give a number above 0.")
+    return Device(bandwidth=bandwidth, fill_rate=fill_rate)
 
 
 def parse_alphas(text: str | None) -> tuple[float | None, ...]:

@@ -23,6 +23,7 @@ from schemas.bench import BenchCell, BenchResult, BenchView, CellKey, Yardstick
 from schemas.problem import ExitCode, Problem
 from schemas.scene import SceneArrays
 from schemas.view import View
+from schemas.work import Device
 from services.bench.cells import Bundle, bundle_of, planned
 from services.bench.groups import said_alpha
 from services.bench.kept import Kept
@@ -36,6 +37,8 @@ from services.rendering import bundle_folder
 from services.store import canonical_json
 from services.versions import code_version, commit, library_versions, machine
 
+DEVICE = Device()
+"""What bounds are stated for where nothing else is asked for."""
 MEASURED_BY = ("labeller", "renderer", "schemas", "services.bench")
 """Sources that decide a result."""
 
@@ -82,10 +85,13 @@ def bench(options: BenchOptions, command: str, progress: Progress, told: Told = 
                     for place in places:
                         subject = Subject(local.gpu(), place.view, place.size)
                         _measure(place, subject, asked, bundle, kept, progress, told)
-    return result_of(kept, command, None if bundle is None else bundle.label, left_out)
+    label = None if bundle is None else bundle.label
+    return result_of(kept, command, label, left_out, options.device)
 
 
-def result_of(kept: Kept, command: str, bundle: str | None, left_out: Sequence[str] = ()) -> BenchResult:
+def result_of(
+    kept: Kept, command: str, bundle: str | None, left_out: Sequence[str] = (), device: Device = DEVICE
+) -> BenchResult:
     """All results of a folder, but for those of other bundles.
 
     Args:
@@ -93,6 +99,7 @@ def result_of(kept: Kept, command: str, bundle: str | None, left_out: Sequence[s
         command: How it was asked for.
         bundle: Label of the bundle, or None.
         left_out: What could not be measured.
+        device: What bounds of frame times are stated for.
     """
     views = []
     for view in kept.merged():
@@ -103,6 +110,7 @@ def result_of(kept: Kept, command: str, bundle: str | None, left_out: Sequence[s
         created=datetime.now(UTC).isoformat(timespec="seconds"),
         versions=library_versions(),
         bundle=bundle,
+        device=device,
         left_out=tuple(left_out),
         views=tuple(views),
     )

@@ -83,15 +83,25 @@ def bench(
     limit: Annotated[
         float, typer.Option("--limit", help="Seconds for the repeats of one cell; slower ones are timed once.")
     ] = 10.0,
+    account: Annotated[
+        bool,
+        typer.Option(
+            "--account/--no-account", help="Count the work of a frame of each cell: passes, fragments, bytes, atomics."
+        ),
+    ] = True,
+    bandwidth: Annotated[float, typer.Option("--bandwidth", help="GB/s that bounds of frame times suppose.")] = 500.0,
+    fill_rate: Annotated[
+        float, typer.Option("--fill-rate", help="Gfragments/s that bounds of frame times suppose.")
+    ] = 50.0,
     resume: Annotated[
         bool, typer.Option("--resume/--fresh", help="Keep what was measured into --out already, or measure all anew.")
     ] = True,
     state: StateOption = DEFAULT_STATE,
     as_json: JsonOption = False,
 ) -> None:
-    """Measure every technique: time of each pass, bytes, errors, scores at equal fragments and equal memory."""
+    """Measure every technique: time of each pass, bytes, errors, scores at equal fragments and memory, work counted."""
     from services.bench.groups import group, groups_of
-    from services.bench.options import BenchOptions, parse_alphas, parse_budgets, parse_sizes, parse_tails
+    from services.bench.options import BenchOptions, parse_alphas, parse_budgets, parse_device, parse_sizes, parse_tails
     from services.progress import make_progress
     from services.render_options import parse_needs, parse_refine, parse_techniques, said_left_out
 
@@ -114,6 +124,8 @@ def bench(
         equal_memory=equal_memory,
         path=path,
         repeats=repeats,
+        account=account,
+        device=parse_device(bandwidth, fill_rate),
         limit=limit,
         resume=resume,
         state=state,
@@ -133,7 +145,7 @@ def bench(
         return
     groups = groups_of(result.views)
     for each in [*groups, *([group("All of them", result.views)] if len(groups) > 1 else [])]:
-        show(each)
+        show(each, result.device)
     if note := check_same_code(result):
         progress.note(note)
     if note := said_left_out([techniques], bundle is not None):

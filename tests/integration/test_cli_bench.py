@@ -33,7 +33,7 @@ from services.cli.app import run
 from services.summary import UNFIT, said_unfit
 
 ROOT = Path(services.__file__).parent.parent
-FAST = ["--size", "48x32", "--repeats", "1", "--alpha", ".33", "--equal-fragments"]
+FAST = ["--size", "48x32", "--repeats", "1", "--alpha", ".33", "--equal-fragments", "--no-account"]
 
 
 @pytest.fixture(scope="module")
@@ -67,9 +67,13 @@ def test_it_prints_tables_and_leaves_json_plots_and_a_page(
         "sbuffer,moment,kbuffer,kbuffer-optimal",
         "--budgets",
         "1",
+        "--account",
+        "--bandwidth",
+        "250",
     ]
     assert run(command) == ExitCode.OK
     out = capsys.readouterr().out
+    assert "at 250 GB/s and 50 Gfragments/s, no prediction" in out
     assert "nested_shells, alpha 0.33, 48x32: 1 view" in out
     assert "Algorithm 1 (offline), weighted-average tail" in out
     assert out.strip().endswith("out/index.html")
@@ -77,9 +81,15 @@ def test_it_prints_tables_and_leaves_json_plots_and_a_page(
     cells = {cell.technique: cell for cell in result.views[0].cells}
     assert cells["sbuffer"].mse == 0.0
     assert 0.0 < (cells["kbuffer-optimal"].score or 0.0) <= (cells["kbuffer"].score or 0.0)
+    assert cells["sbuffer"].work["capture"].atomics == result.views[0].fragments
+    assert cells["kbuffer-optimal"].work.keys() == cells["kbuffer-optimal"].passes.keys() - {"opaque", "readback"}
+    assert result.device.bandwidth == 250.0
     for plot in ("time-error", "error-bytes", "figure6"):
         assert json.loads((folder / "out" / f"{plot}.vl.json").read_text())["data"]["values"]
-    assert "<svg" in (folder / "out" / "index.html").read_text()
+    page = (folder / "out" / "index.html").read_text()
+    assert "<svg" in page
+    assert "Work of a frame, counted" in page
+    assert "250 GB/s and 50 Gfragments/s" in page
     assert not (folder / ".diaphane").exists(), "it runs without state"
 
 
