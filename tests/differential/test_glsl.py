@@ -18,6 +18,7 @@ from support.training import export_random, random_weights
 
 from renderer import programs
 from renderer.account.glsl import tallied
+from renderer.bin_pass import word_defines
 from renderer.capture import capture
 from renderer.features import derive, gather
 from renderer.frame import Frame
@@ -75,7 +76,10 @@ def compiled(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> 
             for tail in TAIL_NAMES if name == "kbuffer" else (DEFAULT_TAIL,):
                 technique(name, needs).render(frame, Budget(dump.total // 2, tail, chain="two-pass"))
     without: Defines = {"TAIL": NO_TAIL, **{f"TAIL_{kind.name}": int(kind) for kind in TailKind}}
-    for row in (without, *(tail.defines for tail in TAILS.values())):  # the driver may lack what it needs
+    for row in (
+        without,
+        *(word_defines(tail, luma=False) if tail.bins else tail.defines for tail in TAILS.values()),
+    ):  # the driver may lack what it needs
         for surface in ({"TEXTURED": 0, "MIXED": 0}, {"TEXTURED": 1, "MIXED": 1}):
             defines = {**row, "MAX_EXPONENT": MAX_EXPONENT, "WRAPPED": 0, "MORE_UVS": 0, "EMISSIVE": 0}
             recorded("kbuffer/chain.frag", {**defines, **surface})

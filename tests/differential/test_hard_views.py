@@ -107,7 +107,7 @@ def case(request: pytest.FixtureRequest, gl: moderngl.Context) -> tuple[Frame, F
     hard = CASES[request.param]
     gpu = GpuScene(gl, scene_of(hard))
     gpu.programs = _shared(gl)  # compiled once for all scenes
-    frame = Frame(gpu, view_of(hard), *hard.size, clear=CLEAR)
+    frame = Frame(gpu, view_of(hard), *hard.size, clear=CLEAR, float_sums=True)
     dump = capture(frame).dump
     assert dump.total > 30 or hard.size == (1, 1)
     return frame, dump

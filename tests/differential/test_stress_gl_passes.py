@@ -190,7 +190,7 @@ def test_a_wrong_range_of_tiles_is_a_violation(
     ("file", "old", "new"),
     [
         ("allocation/rank.glsl", "0.5 *", "0.51 *"),
-        ("allocation/place.comp", "before.y + growth <= spare", "before.y + growth < spare"),
+        ("allocation/place.comp", "taken > room", "taken >= room"),
     ],
 )
 def test_a_broken_allocation_is_a_violation(
