@@ -10,7 +10,18 @@ from numba import njit
 from numpy.typing import NDArray
 
 from labeller.curves import Curves
-from renderer.allocation.cuts import FULL, MOST_CORE, Cuts, Events, events_of, solve_cuts, within_limits
+from renderer.allocation.cuts import (
+    DROPPED_BITS,
+    FULL,
+    LEAST_PRICE,
+    MOST_CORE,
+    RANKS,
+    Cuts,
+    Events,
+    events_of,
+    solve_cuts,
+    within_limits,
+)
 from renderer.allocation.fill import budget_fill, solve_lambda
 from schemas.tail import DENSITY_G
 from services.stress.allocations import edge_budgets
@@ -115,7 +126,9 @@ def _order_of_gains(name: str, n: Counts, a: Numbers, b: Numbers, found: list[tu
         lowest = (gain - (k - 1.5) * decay)[given].min(initial=math.inf)
         highest = (gain - (k - 0.5) * decay)[missing].max(initial=-math.inf)
         scale = float((np.abs(gain) + n * decay).max())
-        late.append(max((highest - lowest) / scale, 0.0))
+        alike = 2.0 ** (DROPPED_BITS - 22) * max(lowest - LEAST_PRICE, 1.0) if math.isfinite(lowest) else 0.0
+        beyond = LEAST_PRICE + 2.0 ** (RANKS >> 23 - DROPPED_BITS)  # the last rank has no end
+        late.append(max((min(highest, beyond) - lowest - alike) / scale, 0.0))
         places.append(f"F {budget}")
     return within("fill.lambda", name, np.array(late), np.zeros(len(late)), places)
 
@@ -161,15 +174,16 @@ def _cut_limits(name: str, n: NDArray[np.int64], events: Events, found: list[tup
         count = max(-left, 0) + int((cuts.k != (n * inside).sum(axis=1)).sum())
         waiting = (n > 0) & ~inside
         if waiting.any():
+            first = waiting & (np.cumsum(waiting, axis=1) == 1)
             rank = events.rank[waiting].min()
-            count += int(left >= (n * (waiting & (events.rank == rank))).sum(axis=1).max())
+            count += int(left >= n[first & (events.rank == rank)].max())
         if count:
             wrong, where = wrong + count, f"F {budget}"
     return counted("fill.limits", f"cuts, gains {name}", wrong, where)
 
 
 def _order_of_bins(name: str, n: NDArray[np.int64], a: Numbers, b: Numbers, found: list[tuple[int, Cuts]]) -> Finding:
-    """A bin comes at the price where the middle of its fragments does: none that was given above one that was not."""
+    """A bin comes at the price where the middle of its fragments does, as far as prices are told from each other."""
     gain, fall, after = a.astype(np.float64)[:, None], b.astype(np.float64)[:, None], np.cumsum(n, axis=1)
     price = fall * (after - n / 2.0 - 1.0) - gain
     scale = float((np.abs(gain) + after * fall).max())
@@ -178,7 +192,9 @@ def _order_of_bins(name: str, n: NDArray[np.int64], a: Numbers, b: Numbers, foun
         inside = np.arange(n.shape[1]) < cuts.cut[:, None]
         highest = price[inside & (n > 0)].max(initial=-math.inf)
         lowest = price[~inside & (n > 0)].min(initial=math.inf)
-        late.append(max((highest - lowest) / scale, 0.0))
+        alike = 2.0 ** (DROPPED_BITS - 22) * max(lowest - LEAST_PRICE, 1.0) if math.isfinite(lowest) else 0.0
+        beyond = LEAST_PRICE + 2.0 ** (RANKS >> 23 - DROPPED_BITS)  # the last rank has no end
+        late.append(max((min(highest, beyond) - lowest - alike) / scale, 0.0))
         places.append(f"F {budget}")
     return within("fill.cuts", name, np.array(late), np.zeros(len(late)), places)
 
