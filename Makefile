@@ -6,20 +6,23 @@ ARGS ?=
 # The scenes that the result is judged by, and that are never trained on.
 HOLDOUT ?= bottles foliage
 
-.PHONY: help setup setup-tests quickstart bench test lint format lock clean
+.PHONY: help setup setup-tests quickstart bench bench-gpu check check-tests test lint format lock clean
 
 help: ## this list
-	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
 
 setup: ## virtual environment, dependencies, OpenGL
 	@scripts/setup.sh
 
 quickstart: setup ## sample scenes, then the main job on them; prints where the report is
 	$(BIN)/diaphane samples samples
-	$(BIN)/diaphane build samples/*.usd* --budgets 1,2,4 --name quickstart $(addprefix --holdout ,$(HOLDOUT)) $(ARGS)
+	$(BIN)/diaphane build samples/*.usd* --name quickstart $(addprefix --holdout ,$(HOLDOUT)) $(ARGS)
 
 bench: setup ## every technique on the committed suite; goes on where it stopped (hours; ARGS="--quick": minutes)
 	$(BIN)/python -m benchmarks.suite $(ARGS)
+
+bench-gpu: setup ## this machine's graphics card in ten minutes, unattended: one file for benchmarks/results
+	$(BIN)/python -m benchmarks.gpu $(ARGS)
 
 lint: setup ## style, types, direction of imports
 	$(BIN)/ruff check .
@@ -29,6 +32,12 @@ lint: setup ## style, types, direction of imports
 
 setup-tests: setup
 	@scripts/setup-tests.sh
+
+check: setup ## lint, then the tests of single modules and of documents: while you work; installs nothing more
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target lint check-tests
+
+check-tests:
+	@$(BIN)/pytest -m "not installed" tests/unit tests/docs
 
 test: setup ## lint, then all tests
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target setup-tests lint

@@ -11,7 +11,6 @@ that takes longer for a single frame, such as depth peeling on a software driver
 from __future__ import annotations
 
 import argparse
-import json
 import re
 import sys
 import tempfile
@@ -20,6 +19,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from benchmarks.casting.cases import SHARED as FOLDER
+from benchmarks.comparing.measured import RESULTS, read_lines
 from benchmarks.comparing.page import page, pictures
 from benchmarks.comparing.scenes import (
     ALPHAS,
@@ -47,11 +47,12 @@ from services.versions import machine
 from services.writing import replacing
 
 ROOT = Path(__file__).resolve().parents[1]
-RESULTS = ROOT / "benchmarks" / "results"
 PAGE = ROOT / "benchmarks" / "BENCH.md"
 COMMAND = "make bench"
 TECHNIQUES = tuple(name for name, entry in technique_entries.items() if entry.settles == 1)
 """Those that a still frame shows. `kbuffer-temporal` learns from frames: it is measured by `benchmarks.temporal`."""
+BUDGETS = (1.0, 2.0, 4.0)
+"""F / WH, the papers' own: the same for all scenes, since the page has means over them."""
 _QUICK = {"sizes": ((320, 214),), "alphas": (0.33,), "scenes": ("sponza", "bottles")}
 
 
@@ -140,12 +141,6 @@ def _lines(views: Iterable[BenchView]) -> str:
     return "".join(view.model_dump_json(exclude_defaults=True) + "\n" for view in views)
 
 
-def read_lines(path: Path) -> BenchResult:
-    """A committed result: a line for all but the views, then a line for each view."""
-    head, *views = map(json.loads, path.read_text(encoding="utf-8").splitlines())
-    return BenchResult.model_validate({**head, "views": views})
-
-
 def plain_path(line: str) -> str:
     """A sentence without the folder that its scene lies in."""
     return re.sub(r"\S*/", "", line)
@@ -156,6 +151,7 @@ def _options(part: Part, arguments: argparse.Namespace, work: Path) -> BenchOpti
         scenes=(part.case.path,),
         techniques=tuple(name for name in TECHNIQUES if part.measures(name)),
         out=work,
+        budgets=BUDGETS,
         alphas=(part.alpha,),
         sizes=(part.size,),
         bundle=str(arguments.bundle),
@@ -163,6 +159,7 @@ def _options(part: Part, arguments: argparse.Namespace, work: Path) -> BenchOpti
         most_views=arguments.views,
         variants=part.case.variants,
         path=part.path,
+        account=part.size == SIZES[0],
         repeats=arguments.repeats,
         limit=arguments.limit,
     )

@@ -21,9 +21,10 @@ from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 from renderer.authoring import COORDINATES, Geometry, Image, Look, write_material, write_mesh
 from renderer.gate.gltf import GlbContent, Object, damaged, floats, read_glb, walk_nodes
 from renderer.gate.images import PNG
+from renderer.usd.licence import write_licence
 from schemas.scene import Wrap
 
-VERSION = "2"
+VERSION = "3"
 """Changes whenever the same file is converted to something else."""
 TRIANGLES, STRIP, FAN = 4, 5, 6
 WRAPS: dict[int, Wrap] = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
@@ -95,6 +96,7 @@ class _Converter:
         # On a stage every node would be composed as it is written, each time with all that came before it.
         layer = Sdf.Layer.CreateAnonymous(".usdc")
         layer.TransferContent(self._stage.GetRootLayer())
+        write_licence(layer, self._content.document.get("asset"))
         with Sdf.ChangeBlock():
             for number, matrix, mesh in placed:
                 _write_node(layer.GetPrimAtPath("/World"), f"Node{number}", matrix, mesh)

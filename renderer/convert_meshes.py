@@ -27,6 +27,7 @@ from trimesh.resolvers import FilePathResolver
 from renderer.authoring import COORDINATES, Geometry, Look, vectors, write_material, write_mesh
 from renderer.convert_looks import Looks, is_invented
 from renderer.usd.assemble import FARTHEST
+from renderer.usd.licence import write_licence
 from schemas.colour import srgb_to_linear
 from schemas.problem import ExitCode, Problem
 
@@ -177,6 +178,8 @@ class _Writer:
         for name, stands in places.items():
             self._geometry(name, stands)
         self._name_what_is_left_out()
+        if self.source.suffix.lower() in _GLTF:
+            write_licence(self._stage.GetRootLayer(), _gltf_json(self.source).get("asset"))
         self._stage.GetRootLayer().Export(str(path))
         return Converted(
             meshes=len(places),

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import timing
+from renderer.account.ledger import counted_pass
 from renderer.bin_pass import Binned, gather_bins
 from renderer.gpu_scene import OPAQUE, TRANSPARENT, GpuScene, set_uniforms
 from renderer.programs import Defines
@@ -41,7 +42,7 @@ class Clock:
         """Time a block, the GPU's work included."""
         self.ctx.finish()
         start = time.perf_counter()
-        with timing.gpu_pass(name):
+        with timing.gpu_pass(name), counted_pass(name):
             yield
         self.ctx.finish()
         taken = 1e3 * (time.perf_counter() - start)

@@ -9,6 +9,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from renderer.account.ledger import geometry_pass
+from renderer.account.programs import TalliedPrograms
 from renderer.culling import Clusters, Ranges
 from renderer.fragment_list import FragmentList
 from renderer.programs import Defines, Programs
@@ -43,6 +45,8 @@ class GpuScene:
         scene: Triangles and textures; float32 metres relative to the scene's origin.
 
     Attributes:
+        programs: Its shaders.
+        tallied: The same, where a frame is counted (`renderer.account`).
         clusters: Runs of triangles with their bounds, to leave out what a camera does not see.
         fragment_list: What captures append to, kept between views.
     """
@@ -51,6 +55,7 @@ class GpuScene:
         self.ctx = ctx
         self.scene = scene
         self.programs = Programs(ctx)
+        self.tallied = TalliedPrograms(ctx)
         vertices = np.empty(len(scene.positions), dtype=VERTEX)
         vertices["position"] = scene.positions
         vertices["normal"] = scene.normals
@@ -94,6 +99,7 @@ class GpuScene:
             visible: For every batch of the scene the runs that are drawn; None: all of it.
         """
         wanted = set(layers)
+        geometry_pass()
         for number, batch in enumerate(self.scene.batches):
             runs = [(batch.first // 3, batch.count // 3)] if visible is None else visible[number]
             if batch.layer not in wanted or not runs:

@@ -38,9 +38,7 @@ class Programs:
         defines = defines or {}
         key = (vertex, fragment, *sorted(defines.items()))
         if key not in self._compiled:
-            self._compiled[key] = self._ctx.program(
-                vertex_shader=expand(vertex, defines), fragment_shader=expand(fragment, defines)
-            )
+            self._compiled[key] = self.linked(expand(vertex, defines), expand(fragment, defines))
         return self._compiled[key]
 
     def compute(
@@ -50,8 +48,16 @@ class Programs:
         defines, texts = defines or {}, texts or {}
         key = (name, *sorted(defines.items()), *sorted(texts.items()))
         if key not in self._computes:
-            self._computes[key] = self._ctx.compute_shader(expand(name, defines, texts))
+            self._computes[key] = self.computing(expand(name, defines, texts))
         return self._computes[key]
+
+    def linked(self, vertex: str, fragment: str) -> moderngl.Program:
+        """A program of two texts."""
+        return self._ctx.program(vertex_shader=vertex, fragment_shader=fragment)
+
+    def computing(self, text: str) -> moderngl.ComputeShader:
+        """A compute program of a text."""
+        return self._ctx.compute_shader(text)
 
 
 def expand(name: str, defines: Defines, texts: Mapping[str, str] | None = None) -> str:

@@ -11,6 +11,7 @@ from typing import Final, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from schemas.tail import TailName
+from schemas.work import Device, PassWork
 
 FORMAT: Final = "diaphane-bench/1"
 
@@ -94,6 +95,7 @@ class BenchCell(CellKey):
         flicker: Mean over frames, pixels and channels of the change of the display error from frame to frame.
         flicker_k: Mean change of k from frame to frame, over pixels occupied in both.
         skips: What was not needed and is exact without it -> how often.
+        work: Pass -> what it does, counted in one frame after the opaque pass; empty where it was not.
         problem: Why there is no picture.
     """
 
@@ -125,6 +127,7 @@ class BenchCell(CellKey):
     flicker: float | None = Field(default=None, ge=0.0)
     flicker_k: float | None = Field(default=None, ge=0.0)
     skips: dict[str, int] = {}
+    work: dict[str, PassWork] = {}
     problem: str | None = None
 
     @property
@@ -222,6 +225,7 @@ class BenchResult(_Record):
         created: UTC, ISO 8601.
         versions: Of Python and the libraries.
         bundle: Name and digest of the bundle; None: `kbuffer-deep` was left out.
+        device: What the bounds of frame times are stated for; they follow from the cells' work.
         left_out: What was asked for and could not be measured, a sentence each.
         views: In the order of the command.
     """
@@ -231,5 +235,6 @@ class BenchResult(_Record):
     created: str
     versions: dict[str, str]
     bundle: str | None
+    device: Device = Device()
     left_out: tuple[str, ...] = ()
     views: tuple[BenchView, ...]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
 from typing import Final, Literal, NamedTuple
@@ -32,6 +33,9 @@ WGSL: Final = "predict.wgsl"
 WGSL_HALF: Final = "predict_half.wgsl"
 HLSL: Final = "predict.hlsl"
 
+CARD: Final = "model_card.md"
+"""What people should know before they use the bundle; it comes last, with what was measured."""
+
 HALF_FILES: Final = (GLSL_HALF, UBO_HALF, UBO_HALF_DATA, WGSL_HALF)
 """The forms in float16: all of them, or none where the network does not bear that precision."""
 
@@ -39,7 +43,7 @@ SHADERS: Final = (GLSL, UBO, WGSL, HLSL, GLSL_HALF, UBO_HALF, WGSL_HALF)
 """The files that are source of a shader."""
 
 FILES: Final = (WEIGHTS, ONNX, GLSL, UBO, UBO_DATA, WGSL, HLSL, *HALF_FILES)
-"""What a bundle holds beside its manifest."""
+"""What a bundle holds beside its manifest and its card."""
 
 GAIN_FLOOR: Final = 0.02
 """`b = softplus(.) + GAIN_FLOOR`: log gain lost per fragment is at least this, so that 1 / b stays finite."""
@@ -212,6 +216,8 @@ class Provenance(BaseModel):
     Attributes:
         scenes: Name of each training scene -> content hash.
         holdout: The same for the scenes that were only evaluated on.
+        licences: Name of a scene of either -> its licence and whom to name for it, as the scene states them; a scene
+            without an entry states none.
         code_version: Hash of the sources that made it.
         seed: Seed of the training.
         machine: Processor and platform in words.
@@ -222,10 +228,17 @@ class Provenance(BaseModel):
 
     scenes: dict[str, str]
     holdout: dict[str, str] = {}
+    licences: dict[str, str] = {}
     code_version: str
     seed: int
     machine: str
     settings: dict[str, JsonValue] = {}
+
+    @property
+    def known_licences(self) -> dict[str, str]:
+        """Content hash of a scene -> its licence, of those that state one."""
+        scenes = {**self.holdout, **self.scenes}
+        return {scenes[name]: licence for name, licence in self.licences.items() if name in scenes and licence}
 
 
 class Manifest(BaseModel):
@@ -276,8 +289,8 @@ class Manifest(BaseModel):
 
     @model_validator(mode="after")
     def _exactly_our_files(self) -> Manifest:
-        if set(self.files) not in (set(FILES), set(FILES) - set(HALF_FILES)):
-            raise ValueError(f"the files must be {', '.join(FILES)}, with or without those in float16")
+        if set(self.files) - {CARD} not in (set(FILES), set(FILES) - set(HALF_FILES)):
+            raise ValueError(f"the files must be {', '.join(FILES)}, with or without those in float16 and {CARD}")
         return self
 
     @model_validator(mode="after")
@@ -316,6 +329,33 @@ def file_spec(path: Path) -> FileSpec:
     """Size and hash of a file."""
     content = path.read_bytes()
     return FileSpec(sha256=hashlib.sha256(content).hexdigest(), bytes=len(content))
+
+
+def network_digest(files: Mapping[str, str]) -> str:
+    """Hex sha256 that names the network of a bundle, whatever its manifest and its card say.
+
+    Args:
+        files: Name -> hex sha256 of the bundle's files.
+    """
+    named = {name: sha256 for name, sha256 in files.items() if name not in (MANIFEST, CARD)}
+    return hashlib.sha256("".join(f"{sha256}  {name}\n" for name, sha256 in sorted(named.items())).encode()).hexdigest()
+
+
+def write_card(folder: Path, text: str) -> Manifest:
+    """Gives a bundle its model card, or another one, and lists it in the manifest, which is written last.
+
+    Args:
+        folder: The bundle.
+        text: Markdown.
+
+    Raises:
+        Problem: As `load_manifest`.
+    """
+    manifest = load_manifest(folder)
+    (folder / CARD).write_text(text, encoding="utf-8")
+    manifest = manifest.model_copy(update={"files": {**manifest.files, CARD: file_spec(folder / CARD)}})
+    (folder / MANIFEST).write_text(manifest.model_dump_json(indent=2) + "\n", encoding="utf-8")
+    return manifest
 
 
 def load_manifest(folder: Path) -> Manifest:

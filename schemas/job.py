@@ -6,6 +6,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
+from schemas.licence import MOST_CHARACTERS
 from schemas.limits import LIMITS
 from schemas.network import DEFAULT_NETWORK, NetworkSize
 from schemas.pixel_weights import DEFAULT_WEIGHTS, PixelWeights
@@ -50,6 +51,7 @@ class SceneUse(BaseModel):
     Attributes:
         scene: Its id.
         holdout: Whether it is evaluated on and never trained on.
+        licence: Its licence and whom to name for it, for the model card; None: as its stage states them.
         views: Cameras in stage units and axes; empty: the stage's own, else sampled ones.
     """
 
@@ -57,6 +59,7 @@ class SceneUse(BaseModel):
 
     scene: SceneId
     holdout: bool = False
+    licence: Annotated[str, StringConstraints(strip_whitespace=True, max_length=MOST_CHARACTERS)] | None = None
     views: tuple[SceneView, ...] = Field(default=(), max_length=LIMITS.views)
 
     @model_validator(mode="after")
@@ -76,7 +79,8 @@ class JobSpec(BaseModel):
         scenes: What it is made from; empty where a `train` names a data set.
         dataset: Data set that a `train` learns from, instead of scenes.
         model: Version that an `evaluate` measures, `name`, `name@alias` or `name@1.2.0`.
-        budgets: Fragments of a frame as multiples of width * height.
+        budgets: Fragments of a frame as multiples of width * height; None: what the captured views call for, between
+            0.05 and 4 times width * height.
         alpha: Opacity in (0, 1) that every surface gets; None keeps the materials' own.
         views_per_scene: How many views are sampled of a scene without cameras of its own.
         width: Pixels per row.
@@ -107,9 +111,13 @@ class JobSpec(BaseModel):
     scenes: tuple[SceneUse, ...] = Field(default=(), max_length=LIMITS.scenes)
     dataset: DatasetId | None = None
     model: ModelReference | None = None
-    budgets: tuple[Annotated[float, Field(gt=0.0, le=LIMITS.budget)], ...] = Field(
-        default=(1.0, 2.0, 4.0), min_length=1, max_length=LIMITS.budgets
-    )
+    budgets: (
+        Annotated[
+            tuple[Annotated[float, Field(gt=0.0, le=LIMITS.budget)], ...],
+            Field(min_length=1, max_length=LIMITS.budgets),
+        ]
+        | None
+    ) = None
     alpha: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
     views_per_scene: int = Field(default=3, ge=1, le=LIMITS.views)
     width: int = Field(default=1430, ge=LIMITS.min_side, le=LIMITS.max_side)
@@ -156,6 +164,6 @@ class JobSpec(BaseModel):
             raise ValueError("every scene is held out, so there is none to train on")
         if self.width * self.height > LIMITS.pixels:
             raise ValueError(f"{self.width} x {self.height} is more than {LIMITS.pixels} pixels")
-        if min(self.budgets) * self.width * self.height < 1.0:
+        if self.budgets is not None and min(self.budgets) * self.width * self.height < 1.0:
             raise ValueError("a budget is less than one fragment")
         return self

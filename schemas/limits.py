@@ -37,6 +37,8 @@ class Limits:
     """Bytes of the head of a request: line and headers; also of trailers, and whatever else is no body."""
     headers: int = 100
     """Headers of a request, trailers included."""
+    connections: int = 4096
+    """Of a server at once."""
     head_seconds: float = 15.0
     """From the first byte of a connection or a request until its head is there."""
     body_stall_seconds: float = 15.0

@@ -32,7 +32,9 @@ class ListedView(BaseModel):
     def has_direction(self) -> bool:
         """Whether eye and target differ, and up is not parallel to the view axis."""
         try:
-            View(name="", eye=self.eye, target=self.target, up=self.up, fov=self.fov).world_to_view()
+            view = View(name="", eye=self.eye, target=self.target, up=self.up, fov=self.fov)
+            with np.errstate(over="ignore", invalid="ignore"):  # beyond what can be computed with there is none
+                view.world_to_view()
         except ValueError:
             return False
         return True

@@ -2,7 +2,7 @@
 # Sees to what only the tests need: PostgreSQL's programs, with which the tests start servers of their own; Mesa's zink
 # over its software Vulkan driver, on which they draw every technique a second time; the reference compiler of GLSL; a
 # C and a C++ compiler for the header of deploy/client/c; a browser for the dashboard, and its font; a display
-# without a screen, and hands for its keyboard and mouse, for the viewer; strace, for what uploads make processes open.
+# without a screen, and hands for its keyboard and mouse, for the viewer; nginx, before two servers; strace, for what uploads make processes open.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=scripts/common.sh
@@ -37,6 +37,7 @@ have chromium || have google-chrome || needs "the browser of the dashboard's tes
 have_font || needs "the font that the dashboard's pages fall back to" fonts-dejavu-core
 { have cc && have g++; } || needs "a C and a C++ compiler" gcc g++
 { have Xvfb && have xdotool; } || needs "the display of the viewer's tests" xvfb xdotool
+have nginx || needs "the proxy before two servers" nginx-light
 have strace || needs "the tracer of what processes open" strace
 [ "${#missing[@]}" -eq 0 ] && exit 0
 

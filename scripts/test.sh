@@ -22,7 +22,7 @@ join() {
 }
 
 computing=(tests/integration/test_{build,cli,cli_bench,cli_remote,cli_render,cli_view,retrain,stress_gl,web_client,zink}.py)
-computing+=(tests/integration/test_{labeller_benchmark,predictors_benchmark,view_window,web_build}.py)
+computing+=(tests/integration/test_{gpu_benchmark,labeller_benchmark,predictors_benchmark,view_window,web_build}.py)
 
 beside tests/unit tests/property
 "$pytest" --durations=15 tests/attacks tests/chaos tests/differential tests/docs tests/golden || worst=$?

@@ -7,6 +7,8 @@ import time
 from datetime import UTC, datetime
 from pathlib import Path
 
+from schemas.bundle import load_manifest
+from schemas.licence import verdict
 from schemas.network import DEFAULT_NETWORK
 from schemas.pixel_weights import DEFAULT_WEIGHTS
 from services import pipeline
@@ -44,6 +46,7 @@ def build(options: BuildOptions, progress: Progress) -> BuildResult:
         built = pipeline.build(plan, runner)
         dataset = options.state / "datasets" / options.name
         write_dataset(dataset, built.views, runner.store, replay)
+        provenance = load_manifest(Path(built.registered.folder)).provenance
         report = options.state / "reports" / options.name / PAGE
         if runner.worked or not report.is_file():
             with progress.stage("report", 1) as stage:
@@ -53,6 +56,7 @@ def build(options: BuildOptions, progress: Progress) -> BuildResult:
         report=report,
         dataset=dataset,
         registry=built.registered,
+        licences=verdict(provenance.scenes, provenance.licences),
         held_out=tuple(scene.label for scene in built.scenes if scene.held_out),
         measurements=tuple(m for view in built.evaluated for m in view.measurements),
         skipped=dict(progress.skips),
@@ -75,11 +79,14 @@ def _write_report(path: Path, options: BuildOptions, built: Built, runner: Inlin
 def command_line(options: BuildOptions) -> str:
     """The command that asks for this build again."""
     parts = ["diaphane", "build", *map(str, options.scenes)]
-    parts += ["--budgets", ",".join(f"{budget:g}" for budget in options.budgets)]
+    if options.budgets is not None:
+        parts += ["--budgets", ",".join(f"{budget:g}" for budget in options.budgets)]
     parts += ["--name", options.name, "--size", f"{options.width}x{options.height}"]
     parts += ["--alpha", f"{options.alpha:g}"] if options.alpha is not None else []
     for scene in options.holdout:
         parts += ["--holdout", str(scene)]
+    for scene, licence in options.licences.items():
+        parts += ["--licence", f"{scene}={licence}"]
     parts += ["--views", str(options.views)] if options.views is not None else []
     parts += ["--views-per-scene", str(options.views_per_scene), "--tail", options.tail, "--g", f"{options.g:g}"]
     parts += ["--seed", str(options.seed)]

@@ -11,13 +11,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from schemas.bundle import Provenance
 from schemas.pixel_weights import DEFAULT_WEIGHTS
 from schemas.problem import ExitCode, Problem
 from schemas.service import DatasetRecord
 from services.fine_tuning import check_labels, is_replayed, refuse_known, scenes_of
 from services.plan import Plan, source_of_version
 from services.registry import Registry
-from services.stages.tasks import METRIC, trained_on
+from services.stages.inputs import METRIC, trained_on
 from services.store import Address, MissingArtifact, Store
 
 _SETTINGS = ("tail", "g", "metric", "seed", "weights")
@@ -98,6 +99,7 @@ def begin_with(plan: Plan, own: Own, reference: str, replay: bool, registry: Reg
         start=source_of_version(version),
         replayed=tuple((shard.scene, shard.artifact) for shard in again),
         learned=learned,
+        licences=Provenance.model_validate(version.provenance).known_licences,
     )
     return Begun(begun, tuple(lost) if replay else ())
 

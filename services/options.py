@@ -12,12 +12,13 @@ from __future__ import annotations
 import hashlib
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
 from schemas.bundle import TailSpec
+from schemas.licence import tidy
 from schemas.limits import LIMITS
 from schemas.network import DEFAULT_NETWORK, SIZES, NetworkSize
 from schemas.pixel_weights import DEFAULT_WEIGHTS, PIXEL_WEIGHTS, PixelWeights
@@ -35,8 +36,10 @@ class BuildOptions:
     Attributes:
         scenes: USD files, in the order given.
         name: Name of the bundle in the registry.
-        budgets: Fragments of a frame as multiples of width * height, ascending, without duplicates.
+        budgets: Fragments of a frame as multiples of width * height, ascending, without duplicates; None: what the
+            captured views call for (`labeller.budgets`).
         holdout: Those of `scenes` that are evaluated on and never trained on. Empty: chosen by `default_holdout`.
+        licences: Scene -> its licence and whom to name for it, instead of what its stage states.
         alpha: Opacity in (0, 1) that every surface gets; None keeps the materials' own.
         views: JSON file with views; None: the stage's cameras, else sampled ones.
         views_per_scene: How many views are sampled of a scene without cameras of its own.
@@ -60,8 +63,9 @@ class BuildOptions:
 
     scenes: tuple[Path, ...]
     name: str
-    budgets: tuple[float, ...] = (1.0, 2.0, 4.0)
+    budgets: tuple[float, ...] | None = None
     holdout: tuple[Path, ...] = ()
+    licences: Mapping[Path, str] = field(default_factory=dict)
     alpha: float | None = None
     views: Path | None = None
     views_per_scene: int = 3
@@ -83,7 +87,8 @@ class BuildOptions:
         check_bundle_tail(self.tail)
         _check_scenes(self.scenes)
         _check_numbers(self)
-        object.__setattr__(self, "budgets", tuple(sorted(set(self.budgets))))
+        if self.budgets is not None:
+            object.__setattr__(self, "budgets", tuple(sorted(set(self.budgets))))
         object.__setattr__(self, "holdout", _resolve_holdout(self.holdout, self.scenes))
         if self.views is not None and not self.views.is_file():
             raise Problem(
@@ -229,7 +234,7 @@ def check_bundle(reference: str | None, option: str) -> None:
 
 
 def parse_budgets(text: str) -> tuple[float, ...]:
-    """Comma-separated budgets, as in `1,2,4`.
+    """Comma-separated budgets, as in `.5,1,2`.
 
     Raises:
         Problem: An entry is not a number.
@@ -237,7 +242,38 @@ def parse_budgets(text: str) -> tuple[float, ...]:
     try:
         return tuple(float(part) for part in text.split(",") if part.strip())
     except ValueError:
-        raise Problem(f"--budgets '{text}' is not a list of numbers.", "Write it like --budgets 1,2,4.") from None
+        raise Problem(f"--budgets '{text}' is not a list of numbers.", "Write it like --budgets .5,1,2.") from None
+
+
+def parse_licences(texts: Sequence[str], scenes: Sequence[str]) -> dict[str, str]:
+    """Licences of scenes, with whom to name for them.
+
+    Args:
+        texts: Each the licence of all scenes, or `SCENE=LICENCE`, which comes before that.
+        scenes: As named on the command line; one can be meant by its stem too.
+
+    Returns:
+        Scene as named -> licence.
+
+    Raises:
+        Problem: A licence is empty, or of no scene that is named, or of several.
+    """
+    of_all: dict[str, str] = {}
+    own: dict[str, str] = {}
+    for text in texts:
+        name, equals, licence = text.partition("=")
+        named = [scene for scene in scenes if scene == name] or [scene for scene in scenes if Path(scene).stem == name]
+        said = tidy(licence if equals else text)
+        if not said or (equals and len(named) != 1):
+            raise Problem(
+                f"--licence '{text}' names no licence of a scene.",
+                'Write it like --licence "CC0" for all scenes, or --licence "SCENE=CC-BY-4.0, by somebody" for one.',
+            )
+        if equals:
+            own[named[0]] = said
+        else:
+            of_all = dict.fromkeys(scenes, said)
+    return {**of_all, **own}
 
 
 def parse_size(text: str) -> tuple[int, int]:
@@ -318,16 +354,12 @@ def _check_scenes(scenes: tuple[Path, ...]) -> None:
 
 
 def _check_numbers(o: BuildOptions) -> None:
-    if not o.budgets:
-        raise Problem("No budget was given.", "Give at least one: --budgets 1,2,4.")
-    if len(o.budgets) > LIMITS.budgets:
-        raise Problem(f"{len(o.budgets)} budgets are not possible.", f"Give 1 to {LIMITS.budgets}.")
     size, views = f"--size {o.width}x{o.height}", f"--views-per-scene {o.views_per_scene}"
     _require(min(o.width, o.height) >= LIMITS.min_side, size, f"is below {LIMITS.min_side} pixels a side")
     _require(max(o.width, o.height) <= LIMITS.max_side, size, f"is beyond {LIMITS.max_side} pixels a side")
     _require(o.width * o.height <= LIMITS.pixels, size, f"is beyond {LIMITS.pixels} pixels")
-    for budget in o.budgets:
-        check_budget(budget, "--budgets 1,2,4", (o.width, o.height))
+    if o.budgets is not None:
+        _check_budgets(o.budgets, (o.width, o.height))
     check_bundle(o.start, "--from")
     _require(o.alpha is None or 0.0 < o.alpha < 1.0, f"--alpha {o.alpha}", "is not between 0 and 1 (both excluded)")
     _require(1 <= o.views_per_scene <= LIMITS.views, views, f"is not 1..{LIMITS.views}")
@@ -336,6 +368,15 @@ def _check_numbers(o: BuildOptions) -> None:
     _require(o.steps is None or 1 <= o.steps <= LIMITS.steps, f"--steps {o.steps}", f"is not 1..{LIMITS.steps}")
     _require(0 <= o.patience <= LIMITS.steps, f"--patience {o.patience}", f"is not 0..{LIMITS.steps}")
     _require(o.replay is None or o.start is not None, "--replay", "needs --from: there is nothing to forget without it")
+
+
+def _check_budgets(budgets: tuple[float, ...], size: tuple[int, int]) -> None:
+    if not budgets:
+        raise Problem("No budget was given.", "Give at least one, --budgets .5,1,2, or leave out --budgets.")
+    if len(budgets) > LIMITS.budgets:
+        raise Problem(f"{len(budgets)} budgets are not possible.", f"Give 1 to {LIMITS.budgets}.")
+    for budget in budgets:
+        check_budget(budget, "--budgets .5,1,2", size)
 
 
 def _require(holds: bool, option: str, fault: str) -> None:

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-from schemas.bundle import load_manifest
+from schemas.bundle import load_manifest, network_digest, write_card
 from schemas.job import JobSpec
 from schemas.measurement import Measurement, RegistryResult, SceneSummary
 from schemas.problem import ExitCode, Problem
 from schemas.service import SceneRecord, ShardRef
-from services import steps, summary
+from services import budgets, steps, summary
 from services.acceptance import begun_plan
 from services.fine_tuning import without_champion
+from services.model_card import command_of, model_card
 from services.plan import Plan, plan_of_job, source_of_version
 from services.records import Bundle, EvaluatedView, LabelledView, RenderedView, SceneEntry
-from services.registry import Publication
+from services.registry import Publication, bundle_digest
 from services.stages import tasks
 from services.stages.desk import BUNDLE, PAGE
 from services.tasks import Runner, Source, Task
@@ -27,7 +31,7 @@ class Built:
     """What the main job found and made.
 
     Attributes:
-        plan: What was asked for.
+        plan: What was asked for, with its budgets.
         scenes: All scenes.
         views: All labelled views.
         bundle: The exported bundle.
@@ -54,7 +58,9 @@ def build(plan: Plan, runner: Runner) -> Built:
         Problem: Bad input, no GL driver, or a check that does not hold.
     """
     scenes = steps.read_scenes(plan, runner)
-    views = steps.label_views(plan, runner, steps.render_views(plan, runner, scenes))
+    rendered = steps.render_views(plan, runner, scenes)
+    plan = budgets.decided(plan, rendered, runner.progress)
+    views = steps.label_views(plan, runner, rendered)
     champion = _champion(plan, runner)
     bundle = _learn(plan, runner, scenes, views, champion)
     judged = [view for view in views if view.scene.held_out] or list(views)
@@ -122,11 +128,12 @@ def run_job(spec: JobSpec, scenes: Mapping[str, SceneRecord], runner: Runner, jo
     rendered = steps.render_views(plan, runner, entries)
     if spec.kind == "render":
         return {"views": [_view_result(view) for view in rendered]}
+    plan = budgets.decided(plan, rendered, runner.progress)
     views = steps.label_views(plan, runner, rendered)
     dataset = _record_dataset(plan, runner, views)
     if spec.kind == "train":
         champion = _champion(plan, runner)
-        return {"dataset": dataset, **_publish_unscored(runner, _learn(plan, runner, entries, views, champion))}
+        return {"dataset": dataset, **_publish_unscored(plan, runner, _learn(plan, runner, entries, views, champion))}
     if spec.kind == "evaluate":
         return {"dataset": dataset, **_evaluate_job(plan, runner, views, str(spec.model))}
     return {"dataset": dataset, "views": [_view_result(view.rendered) for view in views]}
@@ -179,8 +186,10 @@ def _train_on_dataset(plan: Plan, runner: Runner, dataset: str) -> dict[str, Any
     scenes = {shard.scene: shard.scene_digest for shard in record.shards}
     start = _start(plan, runner, _champion(plan, runner))
     plan = plan.described_by(record.settings)
-    bundle = steps.learn(plan, runner, shards, _all_learned(plan, scenes), {}, start)
-    return {"dataset": dataset, **_publish_unscored(runner, bundle)}
+    learned = _all_learned(plan, scenes)
+    licences = _licences(learned, {**plan.licences, **record.settings.get("licences", {})})
+    bundle = steps.learn(plan, runner, shards, learned, {}, licences, start)
+    return {"dataset": dataset, **_publish_unscored(plan, runner, bundle)}
 
 
 def _learn(
@@ -196,7 +205,24 @@ def _learn(
     trained, held_out = (
         {scene.label: scene.digest for scene in scenes if scene.held_out == held} for held in (False, True)
     )
-    return steps.learn(plan, runner, shards, _all_learned(plan, trained), held_out, _start(plan, runner, champion))
+    learned = _all_learned(plan, trained)
+    licences = _licences({**learned, **held_out}, {**plan.licences, **_stated(scenes)})
+    return steps.learn(plan, runner, shards, learned, held_out, licences, _start(plan, runner, champion))
+
+
+def _stated(scenes: Iterable[SceneEntry]) -> dict[str, str]:
+    """Digest -> licence of the scenes that state one."""
+    return {scene.digest: scene.licence for scene in scenes if scene.licence}
+
+
+def _licences(scenes: Mapping[str, str], known: Mapping[str, str]) -> dict[str, str]:
+    """Label -> licence of the scenes whose licence is known.
+
+    Args:
+        scenes: Label -> digest.
+        known: Digest -> licence.
+    """
+    return {label: known[digest] for label, digest in scenes.items() if digest in known}
 
 
 def _all_learned(plan: Plan, trained: Mapping[str, str]) -> dict[str, str]:
@@ -240,12 +266,15 @@ def _rival(
     bundle: Bundle,
 ) -> tuple[Measurement, ...]:
     """The champion on the same views; nothing if there is no other one, or it was trained on one of their scenes."""
-    if champion is None or champion.digest == bundle.digest or not held_out:
+    if champion is None or not held_out:
+        return ()
+    source = source_of_version(runner.registry.record(champion))
+    if network_digest(source.files) == bundle.network:
         return ()
     trained_on = set(load_manifest(runner.registry.folder(champion)).provenance.scenes.values())
     if trained_on & {view.labelled.scene.digest for view in held_out}:
         return ()
-    return steps.measure_rival(plan, runner, held_out, source_of_version(runner.registry.record(champion)))
+    return steps.measure_rival(plan, runner, held_out, source)
 
 
 def _publish(
@@ -264,7 +293,7 @@ def _publish(
     }
 
     def body() -> dict[str, Any]:
-        publication, known = _into_registry(runner, bundle, score, evaluation)
+        publication, known = _into_registry(plan, runner, bundle, score, evaluation, measured)
         promoted, reason = runner.registry.consider(
             publication, score, rival_score, who=runner.who, promote=plan.promote
         )
@@ -280,11 +309,11 @@ def _publish(
     return RegistryResult.model_validate(_published(runner, body)), rival_score
 
 
-def _publish_unscored(runner: Runner, bundle: Bundle) -> dict[str, Any]:
+def _publish_unscored(plan: Plan, runner: Runner, bundle: Bundle) -> dict[str, Any]:
     """Publishes what was not measured: a version without a score, which nothing promotes by itself."""
 
     def body() -> dict[str, Any]:
-        publication, known = _into_registry(runner, bundle, None, {})
+        publication, known = _into_registry(plan, runner, bundle, None, {}, ())
         _, reason = runner.registry.consider(publication, None, None, who=runner.who, promote=False)
         reference = f"{publication.name}@{publication.version}"
         result = {"reference": reference, "score": None, "champion": False, "reason": reason}
@@ -303,13 +332,23 @@ def _published(runner: Runner, body: Callable[[], dict[str, Any]]) -> dict[str, 
 
 
 def _into_registry(
-    runner: Runner, bundle: Bundle, score: float | None, evaluation: Mapping[str, Any]
+    plan: Plan,
+    runner: Runner,
+    bundle: Bundle,
+    score: float | None,
+    evaluation: Mapping[str, Any],
+    measured: Sequence[Measurement],
 ) -> tuple[Publication, bool]:
-    """The version of a bundle, and whether it was published before."""
-    folder = runner.store.fetch(bundle.task.artifact) / BUNDLE
-    known = bundle.digest in {publication.digest for publication in runner.registry.versions(bundle.name)}
+    """The version of a bundle with its model card, and whether it was published before."""
     artifacts = (bundle.task.artifact, *bundle.task.needs)
-    made = runner.registry.publish(bundle.name, folder, score, evaluation, artifacts=artifacts, job_id=runner.job_id)
+    with tempfile.TemporaryDirectory() as work:
+        folder = Path(shutil.copytree(runner.store.fetch(bundle.task.artifact) / BUNDLE, Path(work) / BUNDLE))
+        write_card(folder, model_card(load_manifest(folder), command_of(plan), measured))
+        digest = bundle_digest(folder)
+        known = digest in {publication.digest for publication in runner.registry.versions(bundle.name)}
+        made = runner.registry.publish(
+            bundle.name, folder, score, evaluation, artifacts=artifacts, job_id=runner.job_id
+        )
     return made, known
 
 
@@ -344,7 +383,8 @@ def _record_dataset(plan: Plan, runner: Runner, views: Sequence[LabelledView]) -
     ]
 
     def body() -> str:
-        return runner.measured.record_dataset(plan.settings, shards, runner.job_id).id
+        settings = {**plan.settings, "licences": _stated(view.scene for view in views)}
+        return runner.measured.record_dataset(settings, shards, runner.job_id).id
 
     return str(runner.step("record data set", body))
 

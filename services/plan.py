@@ -25,6 +25,7 @@ class PlannedScene:
         label: Unique short name.
         source: Its files.
         held_out: Whether it is evaluated on and never trained on.
+        licence: Its licence and whom to name for it; None: as its stage states them.
         listed: Cameras in stage units; empty: the stage's own, else sampled ones.
     """
 
@@ -32,6 +33,7 @@ class PlannedScene:
     source: Source
     held_out: bool
     listed: tuple[ListedView, ...] = ()
+    licence: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +43,8 @@ class Plan:
     Attributes:
         name: Name of the bundle; empty where none is made.
         scenes: The scenes, in the order given.
-        factors: Budgets as multiples of width * height, ascending.
+        factors: Budgets as multiples of width * height, ascending; empty until `services.budgets.decided` where none
+            were given.
         alpha: Opacity that every surface gets; None keeps the materials' own.
         views_per_scene: How many views are sampled of a scene without cameras.
         width: Pixels per row.
@@ -59,6 +62,8 @@ class Plan:
         replay: Shards of an earlier data set in a folder that are trained on as well.
         replayed: Digest of the scene and label artifact of every shard of earlier jobs that is trained on as well.
         learned: Label -> digest of what was learned before, for provenance.
+        licences: Digest -> licence of what was learned before, as far as it is known.
+        is_scored: Whether a version is to be published with a score.
     """
 
     name: str
@@ -81,11 +86,19 @@ class Plan:
     replay: Source | None = None
     replayed: tuple[tuple[str, str], ...] = ()
     learned: Mapping[str, str] = field(default_factory=dict)
+    licences: Mapping[str, str] = field(default_factory=dict)
+    is_scored: bool = True
+
+    @property
+    def pixels(self) -> int:
+        """Of a picture."""
+        return self.width * self.height
 
     @property
     def budgets(self) -> tuple[int, ...]:
         """Budgets in fragments, F, in the order of the factors."""
-        return tuple(int(factor * self.width * self.height) for factor in self.factors)
+        assert self.factors, "budgets are decided once the views are captured"
+        return tuple(int(factor * self.pixels) for factor in self.factors)
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -130,11 +143,12 @@ def plan_of_build(options: BuildOptions) -> Plan:
         root = path.resolve()
         source = Source(digest=scene_digest(path), root=root.name, folder=str(root.parent), trusted=True)
         listed = () if options.views is None else listed_views(options.views, path)
-        scenes.append(PlannedScene(options.labels[path], source, path in options.holdout, listed))
+        licence = options.licences.get(path)
+        scenes.append(PlannedScene(options.labels[path], source, path in options.holdout, listed, licence))
     return Plan(
         name=options.name,
         scenes=tuple(scenes),
-        factors=options.budgets,
+        factors=options.budgets or (),
         alpha=options.alpha,
         views_per_scene=options.views_per_scene,
         width=options.width,
@@ -162,11 +176,11 @@ def plan_of_job(spec: JobSpec, scenes: Mapping[str, SceneRecord]) -> Plan:
     for use, record in zip(spec.scenes, used, strict=True):
         # Two scenes of one name are told apart by the beginning of their ids.
         label = record.name if same[record.name] == 1 else f"{record.name}-{record.id[4:12]}"
-        planned.append(PlannedScene(label, source_of_scene(record), use.holdout, use.views))
+        planned.append(PlannedScene(label, source_of_scene(record), use.holdout, use.views, use.licence))
     return Plan(
         name=spec.name or "",
         scenes=tuple(planned),
-        factors=tuple(sorted(set(spec.budgets))),
+        factors=tuple(sorted(set(spec.budgets or ()))),
         alpha=spec.alpha,
         views_per_scene=spec.views_per_scene,
         width=spec.width,
@@ -180,6 +194,7 @@ def plan_of_job(spec: JobSpec, scenes: Mapping[str, SceneRecord]) -> Plan:
         weights=spec.weights,
         from_champion=spec.start_from == "champion",
         promote=spec.promote == "if-better",
+        is_scored=spec.kind == "build",
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from schemas.bundle import network_digest
 from schemas.measurement import Certificate, Measurement, TrainingPoint
 from schemas.view import View
 from services.tasks import Facts, Source, Task
@@ -22,6 +23,7 @@ class SceneEntry:
         opaque: Whether nothing in it is transparent.
         content: Hash of the root file alone.
         warnings: What of the file was not supported or was missing.
+        licence: Its licence and whom to name for it; empty: none is known.
     """
 
     label: str
@@ -32,6 +34,7 @@ class SceneEntry:
     opaque: bool
     content: str
     warnings: tuple[str, ...]
+    licence: str
 
     @property
     def digest(self) -> str:
@@ -90,7 +93,7 @@ class Bundle:
     Attributes:
         task: That exported it.
         train: That trained it.
-        digest: Over its files.
+        digest: Over its files, before it has a card.
         files: Name -> hex sha256.
         history: How its training went.
     """
@@ -108,8 +111,13 @@ class Bundle:
 
     @property
     def source(self) -> Source:
-        """Names it by its digest; its files lie in the artifact."""
-        return Source(digest=self.digest, trusted=True)
+        """Names it by its network; its files lie in the artifact."""
+        return Source(digest=self.network, trusted=True)
+
+    @property
+    def network(self) -> str:
+        """Digest of its network, the same before and after it has a card."""
+        return network_digest(self.files)
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from services.options import BuildOptions
 from services.plan import Plan, source_of_version
 from services.progress import Progress
 from services.registry import Registry, bundle_digest
-from services.stages.tasks import METRIC
+from services.stages.inputs import METRIC
 from services.tasks import Source
 from trainer.config import TrainConfig
 
@@ -67,7 +67,7 @@ def fine_tuning(
     if options.start is not None:
         source, manifest = _bundle(options.start, registry)
         seen |= manifest.provenance.scenes
-        plan = replace(plan, start=source)
+        plan = replace(plan, start=source, licences=manifest.provenance.known_licences)
         if manifest.hidden != TrainConfig.sized(plan.network).hidden:
             units = "-".join(map(str, manifest.hidden))
             progress.note(

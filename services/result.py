@@ -16,6 +16,7 @@ class BuildResult(BaseModel):
         report: The HTML report.
         dataset: Folder of the data set: index and shards.
         registry: What became of the bundle.
+        licences: Whether the licences of its training scenes allow commercial use, in a sentence.
         held_out: Labels of the scenes that were evaluated on and not trained on; empty if there was only one scene.
         measurements: Of all techniques, views and budgets.
         skipped: What was not done because it did not need to be, with counts.
@@ -28,6 +29,7 @@ class BuildResult(BaseModel):
     report: Path
     dataset: Path
     registry: RegistryResult
+    licences: str
     held_out: tuple[str, ...]
     measurements: tuple[Measurement, ...]
     skipped: dict[str, int]

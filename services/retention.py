@@ -12,6 +12,7 @@ recently used first, while all together are more than `keep_bytes`. What is remo
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -23,6 +24,7 @@ from services.database import Database
 from services.database.tables import datasets, events, jobs, scenes, tasks, uploads, versions
 from services.settings import Settings
 from services.storage import Blobs, Storage
+from services.store import Store
 
 DAY = 86400.0
 ARTIFACT_GRACE = 3600.0
@@ -116,10 +118,12 @@ def sweep(database: Database, storage: Storage, settings: Settings, now: float) 
 
 
 def sweep_cache(storage: Storage, settings: Settings, now: float) -> None:
-    """Removes local copies of what lies in an object store, by the same age and size: for every process with a cache.
+    """Removes local copies of what lies in an object store, by the same age and size, and checkpoints done with.
+
+    Every process with a cache does it for its own.
 
     Args:
-        storage: The service's; nothing is done if it is a folder.
+        storage: The service's; if it is a folder, there are checkpoints alone.
         settings: `keep_days` and `keep_bytes`.
         now: Seconds since 1970 UTC.
     """
@@ -132,6 +136,14 @@ def sweep_cache(storage: Storage, settings: Settings, now: float) -> None:
         for sha256, size, last_used in storage.blobs.cached()
     ]
     _remove(items, sum(item.bytes for item in items), settings, now)
+    _sweep_checkpoints(storage.store)
+
+
+def _sweep_checkpoints(store: Store) -> None:
+    """Removes the checkpoints of trainings whose worker was killed, and which another one has finished."""
+    for folder in store.checkpoints.glob("[0-9a-f]" * 64):
+        if folder.is_dir() and store.holds(f"train/{folder.name}"):
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def references(database: Database) -> References:

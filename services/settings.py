@@ -37,7 +37,7 @@ class Settings(BaseSettings):
         task_seconds: Longest time of a task other than a training.
         train_seconds: Longest time of a training.
         task_bytes: Memory that a task's process may use; 0: no bound.
-        drain_seconds: How long a worker that is told to stop waits for tasks under way.
+        drain_seconds: How long a server that is told to stop waits for requests, and a worker for tasks, under way.
         keep_days: Artifacts, jobs and events unused for longer are removed; 0: kept.
         keep_bytes: Beyond this the least recently used artifacts are removed; 0: no bound.
         hosts: Names, separated by commas, that the API answers for beside those of the loopback interface; `*`: any.

@@ -63,6 +63,7 @@ def learn(
     shards: Sequence[tuple[str, str]],
     scenes: dict[str, str],
     held_out: dict[str, str],
+    licences: dict[str, str],
     start: Source | None,
 ) -> Bundle:
     """Train and export.
@@ -73,6 +74,7 @@ def learn(
         shards: Digest of the asset and label artifact of every training view.
         scenes: Label -> digest of what is trained on.
         held_out: Label -> digest of what is not.
+        licences: Label -> licence of all of them, as far as they are known.
         start: Published version whose weights the training begins with.
 
     Raises:
@@ -80,7 +82,7 @@ def learn(
     """
     train = tasks.train_task(plan, shards, start)
     (trained,) = _map(runner, "train", [train])
-    export = tasks.export_task(plan, train, scenes, held_out)
+    export = tasks.export_task(plan, train, scenes, held_out, licences)
     (exported,) = _map(runner, "export", [export])
     assert trained is not None, "a stage of one task has it done, or raises"
     assert exported is not None, "a stage of one task has it done, or raises"
@@ -154,6 +156,7 @@ def _entry(scene: PlannedScene, facts: Facts) -> SceneEntry:
         opaque=facts["opaque"],
         content=facts["content"],
         warnings=tuple(facts["warnings"]),
+        licence=facts["licence"] if scene.licence is None else scene.licence,
     )
 
 

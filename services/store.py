@@ -35,6 +35,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from schemas.problem import ExitCode, Problem
+
 META = "meta.json"
 STALE_SECONDS = 24 * 3600.0
 DAMAGED_SECONDS = 7 * STALE_SECONDS
@@ -88,6 +90,18 @@ class Address:
     def artifact(self) -> str:
         """`stage/key`, the artifact's name outside this process."""
         return f"{self.stage}/{self.key}"
+
+
+class StoreAway(Problem):
+    """The store does not answer: another try may end well.
+
+    Args:
+        title: See `Problem`.
+        remedy: See `Problem`.
+    """
+
+    def __init__(self, title: str, remedy: str) -> None:
+        super().__init__(title, remedy, ExitCode.TRY_AGAIN)
 
 
 class MissingArtifact(Exception):

@@ -32,8 +32,18 @@ settings.load_profile("diaphane")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """`--golden` writes the golden pictures anew."""
+    """`--golden` writes the golden pictures anew; `--examples` asks the API longer than a run of all tests may."""
     parser.addoption("--golden", action="store_true", help="write the golden pictures anew")
+    parser.addoption("--examples", type=int, default=4, help="requests that schemathesis makes of an operation")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Marks the tests that need a program which `make setup` does not install: `make check` leaves them out."""
+    for item in items:
+        wanted = set(getattr(item, "fixturenames", ()))
+        given = getattr(item, "callspec", None)
+        if wanted & {"chromium", "postgres"} or (given is not None and "postgresql" in given.params.values()):
+            item.add_marker(pytest.mark.installed)
 
 
 @pytest.fixture(scope="module")

@@ -1,9 +1,11 @@
-"""The project's pretrained bundle, trained on none of the suite's scenes and on none whose licence forbids to ship it.
+"""The project's pretrained bundle, trained on none of the suite's scenes and only on those that a company may ship.
 
 python -m benchmarks.comparing.bundle FOLDER --scenes ../shared/scenes --scenes ../shared/training-scenes --work WORK
+python -m benchmarks.comparing.bundle FOLDER --card-only
 
 A stage is captured as authored, with one opacity for all surfaces, and with an opacity of its own for each material;
-its training rows stay in `--work`.
+its training rows stay in `--work`. The bundle has a model card, with what the committed results of the suite
+(`make bench`) say of this very network: `--card-only` writes it anew when these have changed, and trains nothing.
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ from typing import Final
 import numpy as np
 
 from benchmarks.casting.cases import Case, described_cases
+from benchmarks.comparing.measured import RESULTS, measurements_of, read_lines
 from benchmarks.comparing.scenes import SHARED
 from labeller.curves import error_curves, whole_bins
 from labeller.hull import lower_hulls
@@ -29,11 +32,14 @@ from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.opacities import drawn_opacities
 from renderer.scene import LoadOptions, load_scene, scene_digest
-from schemas.bundle import Provenance, TailSpec
+from schemas.bundle import Provenance, TailSpec, load_manifest, write_card
+from schemas.licence import commercial_use, tidy
 from schemas.network import DEFAULT_NETWORK, SIZES, NetworkSize
 from schemas.problem import Problem
 from schemas.scene import SceneArrays
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, DENSITY_G, TailName
+from services.bench.cells import bundle_of
+from services.model_card import model_card
 from services.versions import commit, machine
 from trainer.bundle import Description, export_bundle
 from trainer.config import TrainConfig
@@ -51,8 +57,6 @@ MULTIPLES: Final = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
 HELD: Final = 0.95
 LEAST_FRAGMENTS: Final = 0.15
 """Views with fewer fragments a pixel teach little."""
-FORBIDDEN: Final = ("NC", "none stated", "no further terms")
-"""What a licence says that does not let a company ship what was trained on a scene."""
 _PARITY_ROWS: Final = 100_000
 
 
@@ -78,9 +82,9 @@ def sources(folders: list[Path]) -> Iterator[Source]:
         for case in described_cases(folder):
             licence = licences[case.scene]
             seen[case.scene] = seen.get(case.scene, 0) + 1
-            if case.scene in SHARED or seen[case.scene] > STAGES or any(word in licence for word in FORBIDDEN):
+            if case.scene in SHARED or seen[case.scene] > STAGES or commercial_use(licence) != "allowed":
                 continue
-            yield Source(case, licence)
+            yield Source(case, tidy(licence))
 
 
 def rows_of(case: Case, tail: TailName, work: Path) -> list[ViewData]:
@@ -145,28 +149,46 @@ def export(chosen: list[Source], network: NetworkSize, tail: TailName, work: Pat
         metric="display",
         provenance=Provenance(
             scenes={s.case.scene: scene_digest(s.case.path) for s in chosen if s.case.scene in taught},
+            licences={s.case.scene: s.licence for s in chosen if s.case.scene in taught},
             code_version=commit() or "unknown",
             seed=config.seed,
             machine=", ".join(machine().values()),
-            settings={
-                "training": config.model_dump(mode="json"),
-                "views": len(views),
-                "licences": {s.case.scene: s.licence for s in chosen if s.case.scene in taught},
-            },
+            settings={"training": config.model_dump(mode="json"), "views": len(views), "size": list(SIZE)},
         ),
         evaluation={"training": {"over_optimum": result.score}},
     )
     export_bundle(folder, result.weights, description, features[:: max(1, len(features) // _PARITY_ROWS)], gl_context())
 
 
+def describe_bundle(folder: Path, results: Path = RESULTS) -> None:
+    """Write the model card of the bundle, with what was measured of its network on the suite's scenes.
+
+    Args:
+        folder: The bundle.
+        results: Folder of the suite's committed results.
+    """
+    manifest = load_manifest(folder)
+    label = bundle_of(folder).label
+    found = [read_lines(path) for path in sorted(results.glob("bench-*.jsonl"))]
+    measured = [m for result in found if result.bundle == label for m in measurements_of(result, manifest.tail.name)]
+    scenes = " ".join(f"--scenes ../shared/{name}" for name in ("scenes", "training-scenes"))
+    network = manifest.name.partition("-")[2]
+    command = f"python -m benchmarks.comparing.bundle FOLDER {scenes} --work WORK"
+    write_card(folder, model_card(manifest, f"{command} --network {network} --tail {manifest.tail.name}", measured))
+
+
 def main() -> int:
-    """Trains and exports."""
+    """Trains and exports, and writes the model card."""
     given = _parse()
+    if given.card_only:
+        describe_bundle(given.folder)
+        return 0
     chosen = list(sources(given.scenes))
     if not chosen:
         print("There is no scene to train on beside those of the suite.", file=sys.stderr)
         return 1
     export(chosen, given.network, given.tail, given.work, given.folder)
+    describe_bundle(given.folder)
     print(given.folder)
     return 0
 
@@ -174,10 +196,9 @@ def main() -> int:
 def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="Where the bundle goes.")
-    parser.add_argument(
-        "--scenes", type=Path, required=True, action="append", help="Folder with MANIFEST.json; repeatable."
-    )
-    parser.add_argument("--work", type=Path, required=True, help="Where labels are kept.")
+    parser.add_argument("--scenes", type=Path, action="append", default=[], help="Has MANIFEST.json; repeatable.")
+    parser.add_argument("--work", type=Path, default=Path(".diaphane/bundle"), help="Where labels are kept.")
+    parser.add_argument("--card-only", action="store_true", help="Train nothing: write the model card of FOLDER anew.")
     parser.add_argument("--network", choices=SIZES, default=DEFAULT_NETWORK)
     parser.add_argument("--tail", choices=BINNED_TAILS, default=DEFAULT_TAIL)
     return parser.parse_args()

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from benchmarks.comparing import tables
 from benchmarks.comparing.scenes import BUNDLE, PATH_FRAMES
+from benchmarks.comparing.work import work
 from schemas.bench import BenchResult, BenchView
 from services.bench.bars import error_bars
 from services.bench.cells import bundle_of
@@ -77,6 +78,8 @@ def _driver(driver: str, result: BenchResult, drawn: Mapping[tuple[str, str], st
     parts.append(_tables_of_the_paper(groups))
     parts.append(f"### Every technique ({where}, bounded ones at F = {FACTORS[0]:g} WH)\n")
     parts.append(tables.everything(first, FACTORS[0]))
+    if counted := work(first, FACTORS[0], result.device):
+        parts += [f"### What a frame does ({where}, bounded ones at F = {FACTORS[0]:g} WH)\n", counted]
     parts.append("### Where each wins\n")
     parts.append(
         "On how many of the scenes (each opacity and size apart) a technique is on a Pareto front (no other has "

@@ -16,7 +16,7 @@
 #   RETRAIN_PROMOTE         true: a better version becomes the champion, else it stays a candidate (false)
 #   RETRAIN_SUMMARY         file that the Markdown table for the pull request is written to
 #   RETRAIN_BUDGETS, RETRAIN_SIZE, RETRAIN_ALPHA, RETRAIN_VIEWS, RETRAIN_VIEWS_PER_SCENE, RETRAIN_SEED, RETRAIN_STEPS,
-#   RETRAIN_PATIENCE, RETRAIN_WEIGHTS, RETRAIN_PRIORITY
+#   RETRAIN_PATIENCE, RETRAIN_WEIGHTS, RETRAIN_PRIORITY, RETRAIN_LICENCE
 #                           as the options of `diaphane retrain`; empty: its defaults
 #
 # Arguments of the script are passed on to `diaphane retrain` as well. Exit status: 0 passed, 1 worse or failed, others
@@ -42,7 +42,8 @@ for option in max-regression="${RETRAIN_MAX_REGRESSION:-}" baseline="${RETRAIN_B
     from="${RETRAIN_START_FROM:-}" summary="${RETRAIN_SUMMARY:-}" budgets="${RETRAIN_BUDGETS:-}" \
     size="${RETRAIN_SIZE:-}" alpha="${RETRAIN_ALPHA:-}" views="${RETRAIN_VIEWS:-}" \
     views-per-scene="${RETRAIN_VIEWS_PER_SCENE:-}" seed="${RETRAIN_SEED:-}" steps="${RETRAIN_STEPS:-}" \
-    patience="${RETRAIN_PATIENCE:-}" weights="${RETRAIN_WEIGHTS:-}" priority="${RETRAIN_PRIORITY:-}"; do
+    patience="${RETRAIN_PATIENCE:-}" weights="${RETRAIN_WEIGHTS:-}" priority="${RETRAIN_PRIORITY:-}" \
+    licence="${RETRAIN_LICENCE:-}"; do
     [ -z "${option#*=}" ] || set -- "$@" "--$option"
 done
 

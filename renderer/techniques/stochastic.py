@@ -64,7 +64,8 @@ class Stochastic:
         samples.bind_to_storage_buffer(0)
         defines = {"SAMPLES": self._samples}
         clock = Clock(frame.ctx)
-        colours, depths = frame.float_targets(4, 1)
+        with clock.measure("samples"):
+            colours, depths = frame.float_targets(4, 1)
         for first in range(0, frame.height, rows):
             band = first, min(rows, frame.height - first)
             with clock.measure("samples"):

@@ -11,6 +11,7 @@ from fastapi import APIRouter, Depends, FastAPI
 
 from services import dashboard
 from services.api import errors
+from services.api.description import document_text
 from services.api.feeds import Feeds
 from services.api.health import Readiness
 from services.api.leases import Leases
@@ -48,6 +49,7 @@ def create_app(service: Service, *, hosts: Sequence[str] = LOOPBACK) -> FastAPI:
     feeds = Feeds(service.database)
     app.state.service = service
     app.state.feeds = feeds
+    app.state.document = document_text
     app.state.metrics = Metrics(service, feeds)
     app.state.readiness = Readiness(service)
     app.state.guard = guard = Guard(service.keys, settings.rate, settings.burst, service.database)

@@ -34,7 +34,7 @@ _EXAMPLES: dict[str, Any] = {
         "kind": "build",
         "name": "glass",
         "scenes": [{"scene": "scn_0123456789abcdef0123456789abcdef"}],
-        "budgets": [1.0, 2.0, 4.0],
+        "budgets": [0.5, 1.0, 2.0],
     },
     "NewUpload": {"sha256": "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855", "bytes": 0},
     "NewScene": {

@@ -3,9 +3,11 @@
 Rules:
 - the head of a request has at most `LIMITS.head_bytes` and `LIMITS.headers`, counted while it arrives; trailers and
   the frames of chunks are held to the same, since a parser keeps them just as long;
+- a server has at most `LIMITS.connections`, or as many as the process may open: a further one is refused at once;
 - a connection on which no request is under way, or a head has begun, is closed after `LIMITS.head_seconds`, however
   many bytes trickle in: only a whole head counts;
 - what is refused here is a problem document, as everywhere else, and ends the connection;
+- a connection that was accepted just before the server is told to stop still gets its answer;
 - an answer that nobody takes is given up, so that a connection that was closed does not stay for what it has not sent.
 
 Bodies that a handler waits for are bounded by `services.api.body`.
@@ -14,6 +16,7 @@ Bodies that a handler waits for are bounded by `services.api.body`.
 from __future__ import annotations
 
 import asyncio
+import resource
 from http import HTTPStatus
 from typing import Any
 
@@ -22,6 +25,11 @@ from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 from schemas.limits import LIMITS
 from services.api.errors import answer
 from services.problems import Refusal
+
+ARRIVAL_SECONDS = 0.5
+"""In which a request comes on a connection that was opened just before the server stops."""
+_OWN_FILES = 256
+"""Files and connections of the process itself, beside those of its clients."""
 
 
 class BoundedProtocol(HttpToolsProtocol):
@@ -32,6 +40,7 @@ class BoundedProtocol(HttpToolsProtocol):
         options: The same.
     """
 
+    most_connections = LIMITS.connections
     head_seconds = LIMITS.head_seconds
     send_stall_seconds = LIMITS.send_stall_seconds
 
@@ -42,11 +51,15 @@ class BoundedProtocol(HttpToolsProtocol):
         self._in_head = False
         self._refusal: Refusal | None = None
         self._deadline: asyncio.TimerHandle | None = None
+        self._is_last = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as uvicorn's
-        """Begins to wait for a request."""
+        """Begins to wait for a request, if there is room for one more connection."""
         super().connection_made(transport)
         self._expect()
+        if len(self.connections) > self.most_connections:
+            self._refusal = Refusal("unavailable", "Too many connections are open.")
+            self.send_400_response("")
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Forgets the time limit."""
@@ -86,6 +99,8 @@ class BoundedProtocol(HttpToolsProtocol):
         self._in_head, self._held = False, 0
         self._arrived()
         super().on_headers_complete()
+        if self._is_last and self.cycle is not None:
+            self.cycle.keep_alive = False
 
     def on_body(self, body: bytes) -> None:
         """A piece of a body is handed on."""
@@ -114,9 +129,21 @@ class BoundedProtocol(HttpToolsProtocol):
         if self.transport.is_closing():
             self._watch_rest(self.transport.get_write_buffer_size() + 1)
 
+    def shutdown(self) -> None:
+        """Ends the connection after the answer under way, also if its first request is still on the way."""
+        if self.cycle is not None:
+            super().shutdown()
+            return
+        self._is_last = True
+        self.loop.call_later(ARRIVAL_SECONDS, self._end_unused)
+
     def timeout_keep_alive_handler(self) -> None:
         """Closes a connection that is not used, and soon also one whose last answer is not taken."""
         if not self.transport.is_closing():
+            self._close()
+
+    def _end_unused(self) -> None:
+        if self.cycle is None and not self.transport.is_closing():
             self._close()
 
     def _take(self, size: int) -> None:
@@ -157,6 +184,16 @@ class BoundedProtocol(HttpToolsProtocol):
             self.transport.abort()
         elif left:
             self.loop.call_later(self.send_stall_seconds, self._watch_rest, left)
+
+
+def room_for_connections() -> int:
+    """How many connections a server may have, once the process may open as many files as it is allowed to."""
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = LIMITS.connections + _OWN_FILES
+    soft = wanted if hard == resource.RLIM_INFINITY else min(hard, wanted)
+    if soft > resource.getrlimit(resource.RLIMIT_NOFILE)[0]:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    return max(1, min(LIMITS.connections, soft - _OWN_FILES))
 
 
 def _too_long() -> Refusal:

@@ -6,7 +6,9 @@ transport hands them to the kernel without a copy of its own.
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
+import math
 import socket
 from collections.abc import Sequence
 
@@ -16,11 +18,11 @@ from fastapi import FastAPI
 from services.api.application import create_app
 from services.api.feeds import Feeds
 from services.api.observe import LOOPBACK
-from services.api.protocol import BoundedProtocol
+from services.api.protocol import BoundedProtocol, room_for_connections
 from services.service import Service
 
-DRAIN_SECONDS = 5
-"""How long requests under way may take once the server is told to stop."""
+DRAIN_SECONDS = 5.0
+"""How long requests under way may take once a server without settings is told to stop."""
 
 
 class Server(uvicorn.Server):
@@ -38,6 +40,9 @@ class Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Stops listening, ends the event streams, and waits for the requests under way."""
         self._feeds.close()
+        # Whoever is in the listener's queue by now is accepted in the first round, and would be refused by its end.
+        for _ in range(2):
+            await asyncio.sleep(0)
         await super().shutdown(sockets)
 
 
@@ -62,10 +67,13 @@ def make_server(service: Service, host: str, port: int, hosts: Sequence[str] = (
             address no others, on any other address all, because there a name cannot be guessed.
     """
     names = (*LOOPBACK, *hosts) if hosts or is_loopback(host) else ("*",)
-    return server_of(create_app(service, hosts=names), host, port, service.settings.trusted_proxies)
+    settings = service.settings
+    return server_of(create_app(service, hosts=names), host, port, settings.trusted_proxies, settings.drain_seconds)
 
 
-def server_of(app: FastAPI, host: str, port: int, proxies: Sequence[str] = ()) -> Server:
+def server_of(
+    app: FastAPI, host: str, port: int, proxies: Sequence[str] = (), drain_seconds: float = DRAIN_SECONDS
+) -> Server:
     """A server of an application; see `make_server`.
 
     Args:
@@ -73,7 +81,9 @@ def server_of(app: FastAPI, host: str, port: int, proxies: Sequence[str] = ()) -
         host: Address that it listens on.
         port: Port; 0: a free one.
         proxies: Addresses and networks of proxies whose `X-Forwarded-For` and `X-Forwarded-Proto` are believed.
+        drain_seconds: How long requests under way may take once it is told to stop.
     """
+    BoundedProtocol.most_connections = room_for_connections()
     config = uvicorn.Config(
         app,
         host=host,
@@ -87,6 +97,6 @@ def server_of(app: FastAPI, host: str, port: int, proxies: Sequence[str] = ()) -
         log_config=None,
         server_header=False,
         timeout_keep_alive=30,
-        timeout_graceful_shutdown=DRAIN_SECONDS,
+        timeout_graceful_shutdown=math.ceil(drain_seconds),
     )
     return Server(config, app.state.feeds)

@@ -9,11 +9,10 @@ from pathlib import Path
 from renderer.techniques import TECHNIQUES
 from renderer.techniques.chain import SLOT_BYTES
 from schemas.bench import Basis, CellKey
-from schemas.bundle import MANIFEST, TailSpec, load_manifest
+from schemas.bundle import TailSpec, load_manifest, network_digest
 from schemas.tail import DEFAULT_TAIL, TAILS, TailKind, TailName
 from services.bench.options import BenchOptions
 from services.options import chosen_tail
-from services.store import file_sha256
 
 FIXED = "kbuffer"
 """Whose total bytes are what the others are given at equal memory."""
@@ -25,7 +24,7 @@ class Bundle:
 
     Attributes:
         folder: Where it lies.
-        label: Name and digest of its manifest, which lists the digests of its files.
+        label: Name and digest of its network: a model card says what was measured under this label.
         tail: Tail that it was trained for, and is rendered with.
     """
 
@@ -41,7 +40,8 @@ def bundle_of(folder: Path) -> Bundle:
         Problem: It is none, or damaged.
     """
     manifest = load_manifest(folder)
-    return Bundle(folder, f"{manifest.name}@{file_sha256(folder / MANIFEST)[:12]}", manifest.tail)
+    network = network_digest({name: file.sha256 for name, file in manifest.files.items()})
+    return Bundle(folder, f"{manifest.name}@{network[:12]}", manifest.tail)
 
 
 def planned(options: BenchOptions, bundle: Bundle | None) -> list[CellKey]:
@@ -55,7 +55,7 @@ def planned(options: BenchOptions, bundle: Bundle | None) -> list[CellKey]:
             bases: Sequence[Basis] = ("fragments", "memory") if options.equal_memory else ("fragments",)
             cells += [
                 CellKey(technique=name, basis=basis, budget_factor=factor, tail=tail, g=g, bundle=label)
-                for factor in options.budgets
+                for factor in options.factors
                 for basis in bases
             ]
     return cells

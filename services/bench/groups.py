@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from renderer.techniques import TECHNIQUES
 from schemas.bench import BenchCell, BenchView, CellKey
 from schemas.tail import DEFAULT_TAIL, DENSITY_G
+from services.bench.account import Account, account_of
 from services.summary import MSE_FLOOR, ORACLE, geometric_mean, mean
 
 ORDER = list(TECHNIQUES)
@@ -45,6 +46,7 @@ class Row:
         fits: Whether all its pools fit one storage buffer. Bytes and this also count views without a picture.
         flicker: Mean.
         flicker_k: Mean.
+        account: What its frames do; None: it was not counted.
         problem: Why there is none, where no view has one.
     """
 
@@ -73,6 +75,7 @@ class Row:
     fits: bool
     flicker: float | None
     flicker_k: float | None
+    account: Account | None
     problem: str | None
 
     @property
@@ -249,6 +252,7 @@ def _row(key: CellKey, found: Sequence[tuple[BenchView, BenchCell]]) -> Row:
         fits=all(cell.fits for cell in every),
         flicker=_mean(decided, lambda cell: cell.flicker),
         flicker_k=_mean(decided, lambda cell: cell.flicker_k),
+        account=account_of(found),
         problem=found[0][1].problem if not cells else None,
     )
 

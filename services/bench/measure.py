@@ -1,4 +1,4 @@
-"""The cells of one view, measured: pictures first, for errors and bytes, then times in turns, then the camera path."""
+"""The cells of one view: pictures, for errors and bytes; times in turns; accounts of work; the camera path."""
 
 from __future__ import annotations
 
@@ -62,6 +62,9 @@ class Bench:
         for run in timed:
             times = {"repeats": len(run.recordings), "passes": run.passes(), "gpu": run.gpu(), "frame": run.frame()}
             self._cells[run.key] = self._cells[run.key].model_copy(update=times)
+        if self.options.account:
+            for run in timed:
+                self._cells[run.key] = self._cells[run.key].model_copy(update={"work": run.work(self.subject)})
         if self.options.path:
             for key, found in measure_flicker(self.subject, timed, self.options.path).items():
                 update = {"flicker": found.colour, "flicker_k": found.k}
@@ -70,9 +73,9 @@ class Bench:
 
     def _measure_yardsticks(self, keys: Sequence[CellKey]) -> None:
         tails = dict.fromkeys((key.tail, key.g) for key in keys if key.tail is not None)
-        found = self.subject.yardsticks("greedy", ORACLE_TAIL, DENSITY_G, self.options.budgets)
+        found = self.subject.yardsticks("greedy", ORACLE_TAIL, DENSITY_G, self.options.factors)
         for tail, g in tails:
-            found += self.subject.yardsticks("optimal", tail, DENSITY_G if g is None else g, self.options.budgets)
+            found += self.subject.yardsticks("optimal", tail, DENSITY_G if g is None else g, self.options.factors)
         self._marks = {(mark.rule, mark.tail, mark.g, mark.budget_factor): mark for mark in found}
 
     def _pictured(self, key: CellKey) -> BenchCell:

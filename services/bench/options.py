@@ -11,13 +11,13 @@ from renderer.techniques import TECHNIQUES, Needs, technique
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 from schemas.tail import TailName
+from schemas.work import Device
 from services.options import check_budget, check_bundle, check_steepness, parse_size, parse_tail
 
 AUTHORED = "authored"
 """The word for the materials' own opacity."""
 DEFAULT_SIZE = (1430, 960)
 """DHOIT's."""
-DEFAULT_BUDGETS = (1.0, 2.0, 4.0)
 MOST_FRAMES = 1000
 MOST_REPEATS = 1000
 
@@ -30,7 +30,8 @@ class BenchOptions:
         scenes: Files.
         techniques: Names, see `services.render_options.parse_techniques`.
         out: Folder of the results.
-        budgets: F as multiples of width * height.
+        budgets: F as multiples of width * height; None: for each scene and opacity what its views call for
+            (`labeller.budgets`).
         alphas: Opacities that every surface gets, one run each; None: the materials' own.
         sizes: Widths and heights, one run each.
         tails: Of the bounded techniques; those that need a bundle always have its tail. Empty: the usual one.
@@ -45,6 +46,8 @@ class BenchOptions:
         equal_memory: Whether bounded techniques are also measured at equal total bytes.
         path: Frames of the camera path that flicker is measured on; 0: none.
         repeats: Timed frames of each cell, after a warm-up.
+        account: Whether a frame of each cell is counted (`renderer.account`).
+        device: What bounds of frame times are stated for.
         limit: Seconds that the repeats of one cell may take; what takes longer by itself is timed once.
         resume: Whether cells that were measured into `out` already are kept.
         state: Folder of the registry.
@@ -56,7 +59,7 @@ class BenchOptions:
     scenes: tuple[Path, ...]
     techniques: tuple[str, ...]
     out: Path
-    budgets: tuple[float, ...] = DEFAULT_BUDGETS
+    budgets: tuple[float, ...] | None = None
     alphas: tuple[float | None, ...] = (None,)
     sizes: tuple[tuple[int, int], ...] = (DEFAULT_SIZE,)
     tails: tuple[TailName, ...] = ()
@@ -71,6 +74,8 @@ class BenchOptions:
     equal_memory: bool = True
     path: int = 0
     repeats: int = 3
+    account: bool = True
+    device: Device = field(default_factory=Device)
     limit: float = 10.0
     resume: bool = True
     state: Path = Path(".diaphane")
@@ -83,7 +88,7 @@ class BenchOptions:
         for name in names:
             if names.count(name) > 1:
                 raise Problem(f"{names.count(name)} scenes are called {name}.", "Give each file a name of its own.")
-        if not 1 <= len(self.budgets) <= LIMITS.budgets:
+        if self.budgets is not None and not 1 <= len(self.budgets) <= LIMITS.budgets:
             raise Problem(f"{len(self.budgets)} budgets are not possible.", f"Give 1 to {LIMITS.budgets}.")
         for side in (side for size in self.sizes for side in size):
             if not LIMITS.min_side <= side <= LIMITS.max_side:
@@ -95,8 +100,8 @@ class BenchOptions:
             if width * height > LIMITS.pixels:
                 raise Problem(f"--size {width}x{height} is too large.", f"Give at most {LIMITS.pixels:,} pixels.")
         smallest = min(self.sizes, key=lambda size: size[0] * size[1])
-        for budget in self.budgets:
-            check_budget(budget, "--budgets 1,2,4", smallest)
+        for budget in self.budgets or ():
+            check_budget(budget, "--budgets .5,1,2", smallest)
         _in_range("--repeats", self.repeats, 1, MOST_REPEATS)
         _in_range("--most-views", self.most_views, 1, LIMITS.views)
         if self.path:
@@ -111,6 +116,12 @@ class BenchOptions:
             if TECHNIQUES[name].family == "approximate":
                 technique(name, self.needs)  # refuses nodes and samples that it cannot work with
 
+    @property
+    def factors(self) -> tuple[float, ...]:
+        """The budgets, once they are decided."""
+        assert self.budgets is not None, "budgets are decided once the views are counted"
+        return self.budgets
+
 
 def parse_budgets(text: str) -> tuple[float, ...]:
     """Multiples of width * height, ascending, without duplicates.
@@ -121,7 +132,23 @@ def parse_budgets(text: str) -> tuple[float, ...]:
     Raises:
         Problem: It has something else.
     """
-    return tuple(sorted({_number(part, "--budgets", "1,2,4") for part in _parts(text, "--budgets", "1,2,4")}))
+    return tuple(sorted({_number(part, "--budgets", ".5,1,2") for part in _parts(text, "--budgets", ".5,1,2")}))
+
+
+def parse_device(bandwidth: float, fill_rate: float) -> Device:
+    """What bounds of frame times are stated for.
+
+    Args:
+        bandwidth: GB/s.
+        fill_rate: Gfragments/s.
+
+    Raises:
+        Problem: One of them is not above 0.
+    """
+    for option, value in (("--bandwidth", bandwidth), ("--fill-rate", fill_rate)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise Problem(f"{option} {value:g} cannot be used.", "Give a number above 0.")
+    return Device(bandwidth=bandwidth, fill_rate=fill_rate)
 
 
 def parse_alphas(text: str | None) -> tuple[float | None, ...]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from schemas.bench import BenchResult, BenchView
+from services.bench.account import said_device
 from services.bench.bars import error_bars
 from services.bench.groups import (
     Group,
@@ -73,6 +74,8 @@ def page(result: BenchResult, plots: Sequence[str], mixed: str | None) -> str:
             said_budget=said_budget,
             unfit=UNFIT,
             said_unfit=said_unfit(),
+            device=result.device,
+            said_device=said_device(result.device),
             timed=lambda rows: any(row.gpu for row in rows),
         )
     )

@@ -8,9 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from renderer.account.ledger import count_frame
 from renderer.techniques import TECHNIQUES, Budget, Rendered, Technique
 from renderer.timing import Recording, recording
 from schemas.bench import CellKey, Times
+from schemas.work import PassWork
 from services.bench.subject import Subject
 
 
@@ -60,6 +62,11 @@ class Run:
         """Medians by timer queries, for passes that every frame had."""
         everywhere = [name for name in self._names() if all(name in found.gpu for found in self.recordings)]
         return {name: float(np.median([found.gpu[name] for found in self.recordings])) for name in everywhere}
+
+    def work(self, subject: Subject) -> dict[str, PassWork]:
+        """What the passes of one more frame do, counted."""
+        frame = subject.frame()
+        return count_frame(subject.gpu, lambda: self.technique.render(frame, self.budget))
 
     def frame(self) -> Times | None:
         """Times of the sum of the passes."""

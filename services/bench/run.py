@@ -7,13 +7,14 @@ import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from labeller.budgets import default_budgets
 from renderer.context import describe, gl_context
 from renderer.scene import LoadOptions
 from renderer.timing import timers_are_right
@@ -22,18 +23,22 @@ from schemas.bench import BenchCell, BenchResult, BenchView, CellKey, Yardstick
 from schemas.problem import ExitCode, Problem
 from schemas.scene import SceneArrays
 from schemas.view import View
+from schemas.work import Device
 from services.bench.cells import Bundle, bundle_of, planned
 from services.bench.groups import said_alpha
 from services.bench.kept import Kept
 from services.bench.measure import Bench, without_pictures
 from services.bench.options import BenchOptions
 from services.bench.subject import Subject
+from services.budgets import holds_all, remedy, said_complete, said_defaults
 from services.local_scenes import LocalScene, as_usd
 from services.progress import Progress
 from services.rendering import bundle_folder
 from services.store import canonical_json
 from services.versions import code_version, commit, library_versions, machine
 
+DEVICE = Device()
+"""What bounds are stated for where nothing else is asked for."""
 MEASURED_BY = ("labeller", "renderer", "schemas", "services.bench")
 """Sources that decide a result."""
 
@@ -69,12 +74,24 @@ def bench(options: BenchOptions, command: str, progress: Progress, told: Told = 
     with _bundle(options) as bundle:
         for file in options.scenes:
             with as_usd(file) as usd:
-                for place, subject in _places(options, file, usd, left_out, progress):
-                    _measure(place, subject, options, bundle, kept, progress, told)
-    return result_of(kept, command, None if bundle is None else bundle.label, left_out)
+                for alpha in options.alphas:
+                    local = _loaded(options, alpha, file, usd)
+                    if local.now.scene.is_opaque:
+                        left_out.append(f"{file}, {said_alpha(alpha)}: nothing in it is transparent.")
+                        progress.note(left_out[-1])
+                        continue
+                    places = _places(options, alpha, file, usd, local)
+                    asked = _with_budgets(options, places, local, progress)
+                    for place in places:
+                        subject = Subject(local.gpu(), place.view, place.size)
+                        _measure(place, subject, asked, bundle, kept, progress, told)
+    label = None if bundle is None else bundle.label
+    return result_of(kept, command, label, left_out, options.device)
 
 
-def result_of(kept: Kept, command: str, bundle: str | None, left_out: Sequence[str] = ()) -> BenchResult:
+def result_of(
+    kept: Kept, command: str, bundle: str | None, left_out: Sequence[str] = (), device: Device = DEVICE
+) -> BenchResult:
     """All results of a folder, but for those of other bundles.
 
     Args:
@@ -82,6 +99,7 @@ def result_of(kept: Kept, command: str, bundle: str | None, left_out: Sequence[s
         command: How it was asked for.
         bundle: Label of the bundle, or None.
         left_out: What could not be measured.
+        device: What bounds of frame times are stated for.
     """
     views = []
     for view in kept.merged():
@@ -92,25 +110,46 @@ def result_of(kept: Kept, command: str, bundle: str | None, left_out: Sequence[s
         created=datetime.now(UTC).isoformat(timespec="seconds"),
         versions=library_versions(),
         bundle=bundle,
+        device=device,
         left_out=tuple(left_out),
         views=tuple(views),
     )
 
 
-def _places(
-    options: BenchOptions, file: Path, usd: Path, left_out: list[str], progress: Progress
-) -> Iterator[tuple[_Place, Subject]]:
+def _loaded(options: BenchOptions, alpha: float | None, file: Path, usd: Path) -> LocalScene:
+    local = LocalScene(file, usd, LoadOptions(alpha=alpha, variants=options.variants, refine=options.refine))
+    local.at(None)
+    return local
+
+
+def _places(options: BenchOptions, alpha: float | None, file: Path, usd: Path, local: LocalScene) -> list[_Place]:
+    """The views of a scene with an opacity, at all sizes."""
     digest = scene_digest(usd)
-    for alpha in options.alphas:
-        local = LocalScene(file, usd, LoadOptions(alpha=alpha, variants=options.variants, refine=options.refine))
-        scene = local.at(None)
-        if scene.is_opaque:
-            left_out.append(f"{file}, {said_alpha(alpha)}: nothing in it is transparent.")
-            progress.note(left_out[-1])
-            continue
-        for view in _views(local, options):
-            for size in options.sizes:
-                yield _Place(file, digest, alpha, size, view), Subject(local.gpu(), view, size)
+    return [_Place(file, digest, alpha, size, view) for view in _views(local, options) for size in options.sizes]
+
+
+def _with_budgets(
+    options: BenchOptions, places: Sequence[_Place], local: LocalScene, progress: Progress
+) -> BenchOptions:
+    """The options with their budgets: those of a scene with an opacity are the same at all of its views and sizes."""
+    loads = [_load(place, local) for place in places]
+    if options.budgets is None:
+        options = replace(options, budgets=default_budgets(loads))
+        progress.note(f"{_title(places[0])}: {said_defaults(options.factors, loads)}")
+    if holds_all(options.factors, loads):
+        told = f"{said_complete(options.factors, loads)} {remedy(loads)}"
+        progress.note(f"{_title(places[0])}: {told}")
+    return options
+
+
+def _load(place: _Place, local: LocalScene) -> float:
+    """N / (W H) of a view."""
+    counts = Subject(local.gpu(), place.view, place.size).frame().count()
+    return int(counts.sum(dtype=np.int64)) / len(counts)
+
+
+def _title(place: _Place) -> str:
+    return f"{place.file.stem}, {said_alpha(place.alpha)}"
 
 
 def _views(local: LocalScene, options: BenchOptions) -> list[View]:
@@ -130,7 +169,7 @@ def _measure(
 ) -> None:
     key = _key(place, options)
     missing = kept.missing(key, planned(options, bundle))
-    where = f"{place.file.stem}, {said_alpha(place.alpha)}, {place.size[0]}x{place.size[1]}, {place.view.name}"
+    where = f"{_title(place)}, {place.size[0]}x{place.size[1]}, {place.view.name}"
     if not missing:
         progress.note(f"{where}: measured already")
         return

@@ -14,6 +14,7 @@ from services.cli import output
 from services.cli.scene_options import CameraOption, ComplexityOption, RefineOption, VariantOption
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
 from services.cli.technique_options import (
+    BudgetsOption,
     InferenceOption,
     NodesOption,
     SamplesOption,
@@ -32,7 +33,7 @@ def bench(
         typer.Option("--out", "-o", help="Folder of the results: JSON lines, JSON, Vega-Lite plots, an HTML page."),
     ],
     techniques: Annotated[str, typer.Option("--techniques", "-t", help="Names with commas between, or all.")] = "all",
-    budgets: Annotated[str, typer.Option("--budgets", help="Fragments, as multiples of width x height.")] = "1,2,4",
+    budgets: BudgetsOption = None,
     alpha: Annotated[
         str | None,
         typer.Option(
@@ -82,15 +83,25 @@ def bench(
     limit: Annotated[
         float, typer.Option("--limit", help="Seconds for the repeats of one cell; slower ones are timed once.")
     ] = 10.0,
+    account: Annotated[
+        bool,
+        typer.Option(
+            "--account/--no-account", help="Count the work of a frame of each cell: passes, fragments, bytes, atomics."
+        ),
+    ] = True,
+    bandwidth: Annotated[float, typer.Option("--bandwidth", help="GB/s that bounds of frame times suppose.")] = 500.0,
+    fill_rate: Annotated[
+        float, typer.Option("--fill-rate", help="Gfragments/s that bounds of frame times suppose.")
+    ] = 50.0,
     resume: Annotated[
         bool, typer.Option("--resume/--fresh", help="Keep what was measured into --out already, or measure all anew.")
     ] = True,
     state: StateOption = DEFAULT_STATE,
     as_json: JsonOption = False,
 ) -> None:
-    """Measure every technique: time of each pass, bytes, errors, scores at equal fragments and equal memory."""
+    """Measure every technique: time of each pass, bytes, errors, scores at equal fragments and memory, work counted."""
     from services.bench.groups import group, groups_of
-    from services.bench.options import BenchOptions, parse_alphas, parse_budgets, parse_sizes, parse_tails
+    from services.bench.options import BenchOptions, parse_alphas, parse_budgets, parse_device, parse_sizes, parse_tails
     from services.progress import make_progress
     from services.render_options import parse_needs, parse_refine, parse_techniques, said_left_out
 
@@ -98,7 +109,7 @@ def bench(
         scenes=tuple(files),
         techniques=parse_techniques([techniques], bundle is not None),
         out=out,
-        budgets=parse_budgets(budgets),
+        budgets=None if budgets is None else parse_budgets(budgets),
         alphas=parse_alphas(alpha),
         sizes=parse_sizes(picture_size),
         tails=() if tails is None else parse_tails(tails),
@@ -113,6 +124,8 @@ def bench(
         equal_memory=equal_memory,
         path=path,
         repeats=repeats,
+        account=account,
+        device=parse_device(bandwidth, fill_rate),
         limit=limit,
         resume=resume,
         state=state,
@@ -132,7 +145,7 @@ def bench(
         return
     groups = groups_of(result.views)
     for each in [*groups, *([group("All of them", result.views)] if len(groups) > 1 else [])]:
-        show(each)
+        show(each, result.device)
     if note := check_same_code(result):
         progress.note(note)
     if note := said_left_out([techniques], bundle is not None):

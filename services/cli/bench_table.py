@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from schemas.work import Device
+from services.bench.account import COLUMNS, said_device
 from services.bench.groups import Group, Row, offline, said_budget, said_technique
 from services.cli.lines import print_columns, size
 from services.summary import MSE_FLOOR, UNFIT, number, said_unfit
 
 
-def show(shown: Group) -> None:
-    """Print the views of a group: techniques, offline allocations, and the time of each pass."""
+def show(shown: Group, device: Device) -> None:
+    """Print the views of a group: techniques, offline allocations, the time of each pass, and what frames do.
+
+    Args:
+        shown: The group.
+        device: What bounds of frame times are stated for.
+    """
     count = f"{len(shown.views)} view{'s' if len(shown.views) > 1 else ''}"
     print(f"\n{shown.title}: {count}, N = {shown.depth:.1f} WH")
     with_path = any(row.flicker is not None for row in shown.rows)
@@ -43,6 +50,20 @@ def show(shown: Group) -> None:
             [said_technique(row.key), said_budget(row.key), ", ".join(f"{n} {ms:.1f}" for n, ms in row.passes.items())]
             for row in shown.rows
             if row.passes
+        ],
+    )
+    if any(row.account for row in shown.rows):
+        _show_work(shown, device)
+
+
+def _show_work(shown: Group, device: Device) -> None:
+    print(f"\nwork of a frame, counted; bound: its least time without caches at {said_device(device)}, no prediction")
+    print_columns(
+        ("technique", "budget", *COLUMNS),
+        [
+            [said_technique(row.key), said_budget(row.key), *row.account.columns(device)]
+            for row in shown.rows
+            if row.account
         ],
     )
 

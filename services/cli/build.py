@@ -12,7 +12,9 @@ from schemas.network import DEFAULT_NETWORK
 from schemas.pixel_weights import DEFAULT_WEIGHTS, WEIGHTS_HELP
 from schemas.tail import BUNDLE_TAIL_HELP, DEFAULT_TAIL, DENSITY_G
 from services.cli import output
+from services.cli.scene_options import LicenceOption
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
+from services.cli.technique_options import BudgetsOption
 
 if TYPE_CHECKING:
     from services.options import BuildOptions
@@ -22,14 +24,13 @@ if TYPE_CHECKING:
 def build(
     scenes: Annotated[list[Path], typer.Argument(help="USD files: .usd, .usda, .usdc, .usdz.")],
     name: Annotated[str, typer.Option("--name", help="Name of the bundle in the registry.")],
-    budgets: Annotated[
-        str, typer.Option("--budgets", help="Fragments of a frame, as multiples of width x height.")
-    ] = "1,2,4",
+    budgets: BudgetsOption = None,
     alpha: Annotated[float | None, typer.Option("--alpha", help="Opacity that every surface gets, in (0, 1).")] = None,
     holdout: Annotated[
         list[Path] | None,
         typer.Option("--holdout", help="Scene to evaluate on and never train on; repeatable. Default: a quarter."),
     ] = None,
+    licence: LicenceOption = None,
     views: Annotated[Path | None, typer.Option("--views", help="JSON file with the views of the scenes.")] = None,
     views_per_scene: Annotated[
         int, typer.Option("--views-per-scene", help="Views sampled of a scene that has no cameras.")
@@ -56,15 +57,24 @@ def build(
     as_json: JsonOption = False,
 ) -> None:
     """Render, label, train, evaluate, publish and report. The same command again continues, or finds it all done."""
-    from services.options import BuildOptions, parse_budgets, parse_network, parse_size, parse_tail, parse_weights
+    from services.options import (
+        BuildOptions,
+        parse_budgets,
+        parse_licences,
+        parse_network,
+        parse_size,
+        parse_tail,
+        parse_weights,
+    )
     from services.progress import make_progress
 
     width, height = parse_size(size)
     options = BuildOptions(
         scenes=tuple(scenes),
         name=name,
-        budgets=parse_budgets(budgets),
+        budgets=None if budgets is None else parse_budgets(budgets),
         holdout=tuple(holdout or ()),
+        licences={Path(scene): said for scene, said in parse_licences(licence or (), [*map(str, scenes)]).items()},
         alpha=alpha,
         views=views,
         views_per_scene=views_per_scene,
@@ -120,6 +130,7 @@ def _show(options: BuildOptions, result: BuildResult) -> None:
     if not result.worked:
         console.print("Nothing had to be done: every artifact was there already.", markup=False)
     console.print(f"{result.registry.reference}: {result.registry.reason}", markup=False)
+    console.print(result.licences, markup=False)
     console.print(f"Bundle: {result.registry.folder}", markup=False)
     console.print(f"Data set: {result.dataset}", markup=False)
     console.print(f"Report: {result.report}", markup=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,10 +27,12 @@ class SceneInput:
     Attributes:
         reference: An id or the path of a file.
         held_out: Whether it is evaluated on and never trained on.
+        licence: Its licence and whom to name for it; None: as its stage states them.
     """
 
     reference: str
     held_out: bool
+    licence: str | None = None
 
     @property
     def is_id(self) -> bool:
@@ -58,6 +60,18 @@ def named_scenes(scenes: Sequence[str], held_out: Sequence[str]) -> list[SceneIn
             )
         found[matches[0] if matches else entry] = True
     return [SceneInput(reference, held) for reference, held in found.items()]
+
+
+def with_licences(inputs: Sequence[SceneInput], licences: Sequence[str]) -> list[SceneInput]:
+    """The scenes with the licences of `--licence`; see `services.options.parse_licences`.
+
+    Raises:
+        Problem: One is of no scene that is named.
+    """
+    from services.options import parse_licences
+
+    found = parse_licences(licences, [given.reference for given in inputs])
+    return [replace(given, licence=found.get(given.reference)) for given in inputs]
 
 
 def bring(remote: Remote, references: Sequence[str], *, silent: bool = False) -> list[dict[str, Any]]:
@@ -142,7 +156,7 @@ def scene_uses(
     """
     uses = []
     for given, scene in zip(inputs, scenes, strict=True):
-        use: dict[str, Any] = {"scene": scene["id"], "holdout": given.held_out}
+        use: dict[str, Any] = {"scene": scene["id"], "holdout": given.held_out, "licence": given.licence}
         if views is not None and not given.is_id:
             from renderer.views import listed_views
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from services.cli import output
+from services.cli.job_text import show_job
 from services.cli.lines import percent, plain, print_columns, seconds
 from services.cli.server import DEFAULT_URL, KeyFileOption, LimitOption, UrlOption, connect
 from services.cli.state import JsonOption
@@ -132,26 +133,6 @@ def events(
         details = event["data"].items() if isinstance(event["data"], dict) else [("", event["data"])]
         text = "  ".join(f"{name} {value}".strip() for name, value in details)
         print(f"{event['number']:>5}  {event.get('at', '')}  {event['kind']:<5}  {plain(text)}", flush=True)
-
-
-def show_job(job: dict[str, Any], *, as_json: bool) -> None:
-    """Prints a job."""
-    if as_json:
-        output.print_json(job)
-        return
-    name = f"  {job['name']}" if job.get("name") else ""
-    print(f"{job['id']}  {job['kind']}{name}  {job['state']}  {percent(job['fraction'])}  attempt {job['attempt']}")
-    if problem := job.get("problem"):
-        print(f"  {plain(problem.get('detail') or problem['title'])}\n  {plain(problem.get('remedy', ''))}".rstrip())
-    if job.get("stages"):
-        columns = ("total", "done", "skipped", "running", "queued", "quarantined")
-        rows = [(s["stage"], *(s[c] for c in columns), seconds(s["eta_seconds"])) for s in job["stages"]]
-        print_columns(("stage", *columns, "to go"), rows)
-    if job.get("skipped"):
-        print("Skipped: " + ", ".join(f"{count:,} {plain(what)}" for what, count in job["skipped"].items()) + ".")
-    for name, value in (job.get("result") or {}).items():
-        if isinstance(value, str | int | float):
-            print(f"{plain(name)}: {plain(value)}")
 
 
 def _say(job: dict[str, Any], *, as_json: bool) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 import typer
 
+from schemas.licence import verdict
 from schemas.problem import ExitCode, Problem
 from services.cli import output
 from services.cli.lines import plain
@@ -97,8 +98,12 @@ def show(
         score = "none" if version["score"] is None else f"{version['score']:.4g}"
         print(f"{name}@{version['version']}  score {score}  {version['created']}  {', '.join(marks)}".rstrip())
         print(f"  sha256 {version['digest']}")
+        provenance = version["provenance"]
+        print(f"  {plain(verdict(provenance['scenes'], provenance.get('licences', {})))}")
         if "folder" in version:
             print(f"  {version['folder']}")
+        if card := _card(version):
+            print(f"  model card: {card}")
     for move in meaning["history"]:
         who, why = plain(move["who"]), plain(move["why"])
         print(f"{move['at']}  {move['alias']}: {move['before'] or 'none'} -> {move['after']}  by {who}: {why}")
@@ -133,6 +138,18 @@ def rollback(
     with closing(_open(state, url, key_file)) as registry:
         registry.roll_back(name, alias, reason)
         _say(registry, name, alias)
+
+
+def _card(version: dict[str, Any]) -> str | None:
+    """Where the model card of a version is, if it has one: a file, or an address of the server."""
+    # Imported late: `diaphane --help` needs no schemas.
+    from schemas.bundle import CARD
+
+    if CARD not in version["files"]:
+        return None
+    if "folder" in version:
+        return f"{version['folder']}/{CARD}"
+    return f"/v1/blobs/sha256/{version['files'][CARD]['sha256']}"
 
 
 def _say(registry: Models, name: str, alias: str) -> None:
@@ -181,7 +198,8 @@ class _Local:
         self._registry.rollback(name, reason, alias)
 
     def _detail(self, publication: Publication) -> dict[str, Any]:
-        return {**publication.model_dump(mode="json"), "folder": str(self._registry.folder(publication))}
+        record = self._registry.record(publication).model_dump(mode="json")
+        return {**record, "folder": str(self._registry.folder(publication))}
 
 
 class _Server:

@@ -14,11 +14,11 @@ import typer
 
 from schemas.problem import ExitCode, Problem
 from services.cli import output
+from services.cli.scene_options import LicenceOption
 from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption, connect
 from services.cli.state import JsonOption
 from services.cli.submit import (
     AlphaOption,
-    BudgetsOption,
     NetworkOption,
     NoReplayOption,
     PatienceOption,
@@ -34,6 +34,7 @@ from services.cli.submit import (
     job_fields,
     job_spec,
 )
+from services.cli.technique_options import BudgetsOption
 
 if TYPE_CHECKING:
     from services.cli.comparison import Comparison
@@ -62,6 +63,7 @@ def retrain(
     weights: WeightsOption = None,
     is_promoted: Annotated[bool, typer.Option("--promote", help="Make it the champion if it is better.")] = False,
     summary: Annotated[Path | None, typer.Option("--summary", help="File that the Markdown table goes to.")] = None,
+    licence: LicenceOption = None,
     budgets: BudgetsOption = None,
     alpha: AlphaOption = None,
     views: ViewsOption = None,
@@ -100,7 +102,7 @@ def retrain(
     champion = _champion(remote, name)
     fields |= {"kind": "build", "name": name, "promote": "never"}
     fields |= {"start_from": _start(remote, start, champion), "replay": not is_forgotten}
-    spec = _with_scenes(remote, fields, scenes, holdout, views, silent=as_json)
+    spec = _with_scenes(remote, fields, (scenes, holdout, licence or []), views, silent=as_json)
     job, rival = _finished(remote, spec, champion, silent=as_json)
     comparison = _compare(remote, job, spec, rival if baseline == CHAMPION else None)
     faults = comparison.faults(max_regression)
@@ -153,15 +155,16 @@ def _champion(remote: Remote, name: str) -> dict[str, Any] | None:
 def _with_scenes(
     remote: Remote,
     fields: Mapping[str, Any],
-    scenes: list[str],
-    holdout: list[str],
+    named: tuple[list[str], list[str], list[str]],
     views: Path | None,
     *,
     silent: bool,
 ) -> dict[str, Any]:
-    from services.cli.inputs import bring, named_scenes, scene_uses
+    """The job with its scenes; `named` are those to train on, those held out, and licences, as on the command line."""
+    from services.cli.inputs import bring, named_scenes, scene_uses, with_licences
 
-    inputs = named_scenes(scenes, holdout)
+    scenes, holdout, licences = named
+    inputs = with_licences(named_scenes(scenes, holdout), licences)
     stand_ins = [{"scene": f"scn_{i:032x}", "holdout": given.held_out} for i, given in enumerate(inputs)]
     job_spec({**fields, "scenes": stand_ins})  # whatever is wrong is said before anything is uploaded
     known = bring(remote, [given.reference for given in inputs], silent=silent)

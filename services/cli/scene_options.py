@@ -10,6 +10,14 @@ import typer
 SceneArgument = Annotated[
     Path, typer.Argument(metavar="FILE", help="A scene: .usd, .usda, .usdc, .usdz, .glb, .gltf, .obj, .ply or .stl.")
 ]
+LicenceOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--licence",
+        metavar="[SCENE=]TEXT",
+        help="Licence of all scenes, or of one, and whom to name for it; repeatable. Default: what each stage states.",
+    ),
+]
 AlphaOption = Annotated[
     float | None, typer.Option("--alpha", help="Opacity that every surface gets, in (0, 1]. Default: its own.")
 ]

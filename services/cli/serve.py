@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 8035
 FIRST_KEY = "first"
+EXIT_SECONDS = 5.0
+"""Of a server, beyond what its requests may take."""
 
 
 def serve(
@@ -35,7 +37,7 @@ def serve(
     wanted = () if roles.strip() == "none" else parse_roles(roles)
     os.environ[STATE_VARIABLE] = str(state)
     from services import logs
-    from services.engine.runtime import Parts, Runtime
+    from services.engine.runtime import Runtime
     from services.service import open_service
     from services.settings import Settings
 
@@ -43,8 +45,7 @@ def serve(
     settings = Settings()
     service = open_service(settings)
     show_first_key(service, host)
-    parts = Parts(service.storage, service.registry, service.measured, service.scenes)
-    runtime = Runtime(settings, wanted, parts=parts) if wanted else None
+    runtime = Runtime(settings, wanted) if wanted else None  # with a store of its own, which waits longer
     stop = threading.Event()
     stop_on_signal(stop.set)
     listener = _Listener(service, host, port)
@@ -73,7 +74,7 @@ class _Listener(threading.Thread):
 
         names = [name.strip() for name in service.settings.hosts.split(",") if name.strip()]
         self._server = make_server(service, host, port, names)
-        self._where = host, port
+        self._where, self._drain_seconds = (host, port), service.settings.drain_seconds
 
     @property
     def port(self) -> int:
@@ -104,7 +105,7 @@ class _Listener(threading.Thread):
         """Ends it, after the requests under way."""
         self._server.should_exit = True
         if self.is_alive():
-            self.join(10.0)
+            self.join(self._drain_seconds + EXIT_SECONDS)
 
 
 def show_first_key(service: Service, host: str) -> None:

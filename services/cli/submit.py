@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,15 +14,14 @@ from schemas.pixel_weights import WEIGHTS_HELP
 from schemas.problem import Problem
 from schemas.tail import TAIL_HELP
 from services.cli import output
+from services.cli.scene_options import LicenceOption
 from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption, connect
 from services.cli.state import JsonOption
+from services.cli.technique_options import BudgetsOption
 
 if TYPE_CHECKING:
     from services.cli.inputs import SceneInput
 
-BudgetsOption = Annotated[
-    str | None, typer.Option("--budgets", help="Fragments of a frame, as multiples of width x height: 1,2,4.")
-]
 AlphaOption = Annotated[float | None, typer.Option("--alpha", help="Opacity that every surface gets, in (0, 1).")]
 ViewsOption = Annotated[Path | None, typer.Option("--views", help="JSON file with the views of local scenes.")]
 ViewsPerSceneOption = Annotated[
@@ -55,6 +55,7 @@ def submit(
     name: Annotated[str | None, typer.Option("--name", help="Name of the bundle in the registry.")] = None,
     dataset: Annotated[str | None, typer.Option("--dataset", help="Data set that a train learns from.")] = None,
     model: Annotated[str | None, typer.Option("--model", help="Version that an evaluate measures.")] = None,
+    licence: LicenceOption = None,
     budgets: BudgetsOption = None,
     alpha: AlphaOption = None,
     views: ViewsOption = None,
@@ -83,8 +84,8 @@ def submit(
     as_json: JsonOption = False,
 ) -> None:
     """Submit a job; local scenes are uploaded as far as the server lacks them."""
-    from services.cli.inputs import bring, named_scenes, scene_uses
-    from services.cli.jobs import show_job
+    from services.cli.inputs import bring, named_scenes, scene_uses, with_licences
+    from services.cli.job_text import show_job
     from services.cli.watching import ensure_success, follow
 
     fields = job_fields(
@@ -104,7 +105,7 @@ def submit(
     named = {"name": name, "dataset": dataset, "model": model, "start_from": start, "promote": promote}
     fields |= {"replay": False} if is_forgotten else {}
     fields |= {field: value for field, value in named.items() if value is not None}
-    inputs = named_scenes(scene or (), holdout or ())
+    inputs = with_licences(named_scenes(scene or (), holdout or ()), licence or ())
     # Everything but the scenes' ids is checked before anything is uploaded.
     job_spec({**fields, "kind": kind, "scenes": [_stand_in(i, entry) for i, entry in enumerate(inputs)]})
     remote = connect(url, key_file)
@@ -179,18 +180,18 @@ def _fault(detail: Any) -> str:
 
 
 def _stand_in(number: int, entry: SceneInput) -> dict[str, Any]:
-    return {"scene": entry.reference if entry.is_id else f"scn_{number:032x}", "holdout": entry.held_out}
+    stand_in = entry.reference if entry.is_id else f"scn_{number:032x}"
+    return {"scene": stand_in, "holdout": entry.held_out, "licence": entry.licence}
 
 
 def _split(inputs: list[SceneInput], scenes: list[dict[str, Any]]) -> list[SceneInput]:
     """A quarter of the scenes is held out, by their names, as `diaphane build` does."""
-    from services.cli.inputs import SceneInput
     from services.options import default_holdout
 
     # The number tells scenes of one name apart.
     paths = [Path(str(i)) / str(scene["name"]) for i, scene in enumerate(scenes)]
     chosen = default_holdout(paths)
-    return [SceneInput(entry.reference, path in chosen) for entry, path in zip(inputs, paths, strict=True)]
+    return [replace(entry, held_out=path in chosen) for entry, path in zip(inputs, paths, strict=True)]
 
 
 def _announce(job: dict[str, Any], *, as_json: bool) -> None:

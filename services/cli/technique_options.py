@@ -9,6 +9,14 @@ import typer
 from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAIL_HELP
 
 BudgetOption = Annotated[float, typer.Option("--budget", help="Fragments, as a multiple of width x height.")]
+BudgetsOption = Annotated[
+    str | None,
+    typer.Option(
+        "--budgets",
+        help="Fragments of a frame, as multiples of width x height: .5,1,2. Default: up to three quarters of what the "
+        "views hold, from 0.05 to 4.",
+    ),
+]
 TailOption = Annotated[
     str | None, typer.Option("--tail", help=f"{TAIL_HELP} Default: the bundle's, or {DEFAULT_TAIL}.")
 ]

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path as FolderPath
 from typing import Annotated
 
 from anyio import to_thread
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, StringConstraints
 
-from schemas.bundle import WEIGHTS, Manifest
+from schemas.bundle import CARD, WEIGHTS, Manifest
+from schemas.licence import verdict
 from schemas.measurement import Measurement
 from schemas.problem import ExitCode, Problem
 from services.api.answers import Reason, VersionOrAlias
@@ -94,6 +96,8 @@ def show_model(
         reference=reference,
         record=registry.record(chosen),
         manifest=manifest,
+        licences=verdict(manifest.provenance.scenes, manifest.provenance.licences),
+        card=_card(registry.folder(chosen)),
         cost=_cost(manifest, own),
         versions=paging.slice(published[::-1], lambda publication: publication.version),
         count=len(published),
@@ -148,6 +152,12 @@ def roll_back(
     """Points an alias at the version that it meant before."""
     service.registry.rollback(name, body.reason, body.alias, caller.id)
     return redirect(f"/models/{name}#aliases")
+
+
+def _card(folder: FolderPath) -> str | None:
+    """The model card of a version, Markdown; None where it has none."""
+    file = folder / CARD
+    return file.read_text(encoding="utf-8") if file.is_file() else None
 
 
 def _cost(manifest: Manifest, own: Sequence[Measurement]) -> dict[str, int | None]:

@@ -53,7 +53,7 @@ class ChildOptions:
         inspect: `module:function` of checks of scenes.
         sandbox: `module:function` that shuts the process in; empty: it stays open.
         scratch: Folder of the children's rooms.
-        kernels: Folder of what numba compiled.
+        kernels: Folder of what numba compiled, for each key that jobs are of: what is compiled there is run.
         read: Files and folders that may be read beside the room.
         write: Folders that may be written to beside the room.
         threads: Threads that a body may use.
@@ -82,12 +82,14 @@ class Assignment:
         needs: Folders of artifacts by `stage/key`.
         sources: Folders of sources by digest.
         checkpoints: Folder that an interrupted training goes on from, and is kept in; None: it is no training.
+        owner: Id of the key whose job it is; empty: of none.
     """
 
     subject: str | None = None
     needs: Mapping[str, Path] = field(default_factory=dict)
     sources: Mapping[str, Path] = field(default_factory=dict)
     checkpoints: Path | None = None
+    owner: str = ""
 
 
 class Lost(Exception):
@@ -241,11 +243,19 @@ class Child:
         """Whether the process may see that too."""
         had = self._assignment
         alone = had.subject is None or had.subject == assignment.subject
-        return alone and had.checkpoints == assignment.checkpoints and self.room.is_open()
+        same = (had.owner, had.checkpoints) == (assignment.owner, assignment.checkpoints)
+        return alone and same and self.room.is_open()
+
+    @property
+    def _kernels(self) -> Path:
+        """What numba compiled for the key's tasks, and for no other's; without a key, for this process alone."""
+        owner = self._assignment.owner
+        return self._options.kernels / owner if owner else self.room.tmp
 
     def _start(self) -> None:
         ours, theirs = socket.socketpair()
         self.room.open()
+        self._kernels.mkdir(parents=True, exist_ok=True)
         command = [sys.executable, "-P", "-m", "services.engine.child", str(theirs.fileno()), str(os.getpid())]
         with theirs:
             process = subprocess.Popen(
@@ -260,7 +270,8 @@ class Child:
             )
         channel = Channel(ours)
         options, checkpoints = self._options, self._assignment.checkpoints
-        writable = [*self.room.writable, *options.write, *([] if checkpoints is None else [checkpoints])]
+        own = (*self.room.writable, self._kernels)
+        writable = [*own, *options.write, *([] if checkpoints is None else [checkpoints])]
         with suppress(OSError):  # a child that ended at once is noticed by whoever waits for it
             channel.send(
                 {
@@ -342,7 +353,7 @@ class Child:
         pools = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "LP_NUM_THREADS")
         kept |= {name: os.environ.get(name, count) for name in pools}
         kept |= dict.fromkeys(("TMPDIR", "XDG_CACHE_HOME", "MPLCONFIGDIR"), str(self.room.tmp))
-        kept["NUMBA_CACHE_DIR"] = str(self._options.kernels)
+        kept["NUMBA_CACHE_DIR"] = str(self._kernels)
         return {**kept, "PYTHONUNBUFFERED": "1", "PYTHONPATH": os.pathsep.join([_ROOT, *_paths(kept)])}
 
     def _kill(self) -> None:

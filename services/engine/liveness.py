@@ -179,10 +179,14 @@ class Liveness:
                 system.hand_back(connection, self._database, self.executor, orphans)
 
     def _forget(self) -> None:
-        table = tables.executors
-        old = clock(self._database) - table.c.last_seen > FORGOTTEN_SECONDS
+        """Removes the rows of processes that have ended, once nothing is claimed by them any more."""
+        table, age = tables.executors, clock(self._database) - tables.executors.c.last_seen
+        with self._database.read() as connection:
+            owners = system.owners(connection, self._database)
+            here = connection.execute(sa.select(table).where(table.c.host == self._host)).all()
+        gone = [row.id for row in here if row.id not in owners and process_start(row.pid) != row.started]
         with self._database.write() as connection:
-            connection.execute(table.delete().where(old))
+            connection.execute(table.delete().where(table.c.id.in_(gone) | (age > FORGOTTEN_SECONDS)))
 
     def _run(self) -> None:
         while not self._end.wait(self._settings.heartbeat):

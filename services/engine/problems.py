@@ -40,11 +40,15 @@ class TaskError(Exception):
         self.problem = problem
 
 
+class Crashed(TaskError):
+    """The process of a task ended by itself, or was killed."""
+
+
 class TimedOut(TaskError):
     """A task took longer than it may."""
 
 
-def crashed(title: str, code: int | None) -> TaskError:
+def crashed(title: str, code: int | None) -> Crashed:
     """The process that did a task ended by itself.
 
     Args:
@@ -61,7 +65,7 @@ def crashed(title: str, code: int | None) -> TaskError:
         )
     else:
         how, remedy = f"ended with status {code}", "Look into the job's log for the reason."
-    return TaskError(Problem(f"The process of {title} {how}.", remedy, ExitCode.TRY_AGAIN))
+    return Crashed(Problem(f"The process of {title} {how}.", remedy, ExitCode.TRY_AGAIN))
 
 
 def timed_out(title: str, seconds: float) -> TimedOut:

@@ -22,7 +22,7 @@ from services.engine.claims import Claims
 from services.engine.states import Abandoned, Claim
 from services.engine.tasks import Tasks
 from services.progress import Stage
-from services.store import MissingArtifact
+from services.store import MissingArtifact, StoreAway
 from services.tasks import FACTS, Facts, StageName, Task
 
 if TYPE_CHECKING:
@@ -240,5 +240,7 @@ class DurableRunner:
 def _outcome(body: Callable[[], Any]) -> dict[str, Any]:
     try:
         return {"value": body()}
+    except StoreAway:  # no result of the step: it is tried again
+        raise
     except Problem as problem:
         return {"problem": [problem.title, problem.remedy, int(problem.code)]}

@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 
 OUTAGES = 20
 """A job that meets so many outages of the database fails."""
+STORE_PATIENCE_SECONDS = 600.0
+"""How long work under way waits for an object store that does not answer; then it fails, to be tried again."""
 
 log = structlog.get_logger(__name__)
 
@@ -82,7 +84,7 @@ def open_parts(settings: Settings, database: Database, jobs: Jobs) -> Parts:
     from services.scenes import Scenes
     from services.storage import open_storage
 
-    storage = open_storage(settings)
+    storage = open_storage(settings, STORE_PATIENCE_SECONDS)
     registry = open_registry(database, storage.blobs, settings)
     return Parts(storage, registry, Measured(database), Scenes(database, storage.blobs, jobs))
 
@@ -258,20 +260,18 @@ class Runtime:
         DBOS.listen_queues(list(self._slots))
         DBOS.launch()
         system.limit_slots(self._claimable)
+        system.bound_waits()
 
     def _child_options(self, children: int) -> ChildOptions:
         self._scratch = Scratch(self.settings.state.resolve() / "work")
         self._stack.callback(self._scratch.close)
         sweep_sources(self.settings.cache_folder, time.time())
-        kernels = self._scratch.folder.parent / KERNELS
-        kernels.mkdir(exist_ok=True)
         return ChildOptions(
             make=self._bodies.make,
             inspect=self._bodies.inspect,
             sandbox=self._bodies.sandbox,
             scratch=self._scratch.folder,
-            kernels=kernels,
-            write=(kernels,),
+            kernels=self._scratch.folder.parent / KERNELS,
             memory_bytes=self.settings.task_bytes or None,
             threads=max(1, len(os.sched_getaffinity(0)) // max(1, children)),
         )

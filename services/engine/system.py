@@ -6,6 +6,7 @@ tables of our own, in the same database, so that a state and what is queued for 
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final
@@ -24,6 +25,8 @@ VERSION: Final = "1"
 LIVE: Final = ("ENQUEUED", "DELAYED", "PENDING")
 LOST: Final = "MAX_RECOVERY_ATTEMPTS_EXCEEDED"
 SCHEMA: Final = "dbos"
+LONGEST_WAIT_SECONDS = 2.0
+"""Before DBOS asks again for a database that did not answer."""
 
 _COLUMNS = (
     *("workflow_uuid", "status", "name", "executor_id", "application_version", "queue_name", "priority"),
@@ -147,6 +150,13 @@ def statuses(connection: sa.Connection, database: Database, prefix: str) -> list
     return [(row[0], row[1]) for row in connection.execute(found.order_by(table.c.workflow_uuid))]
 
 
+def first_priority(connection: sa.Connection, database: Database, prefix: str) -> int | None:
+    """The earliest turn that a workflow under a prefix had; None if there is none."""
+    table = workflows(database)
+    found = connection.scalar(sa.select(sa.func.min(table.c.priority)).where(under(table, prefix, database)))
+    return None if found is None else int(found)
+
+
 def status(connection: sa.Connection, database: Database, workflow_id: str) -> str | None:
     """Status of one workflow; None if there is none."""
     table = workflows(database)
@@ -244,6 +254,36 @@ def limit_slots(slots: dict[str, int]) -> None:
         return queue
 
     system_database.get_queue = get_queue  # type: ignore[method-assign]
+
+
+def bound_waits() -> None:
+    """Bounds how long this process stays away from a database that is back, or that others use as well.
+
+    DBOS doubles its wait after every connection that failed, up to 90 s: after an outage of a minute a worker may do
+    nothing for as long again. It also doubles the time between two looks into a queue, up to 120 s, whenever another
+    worker claimed from it at the same moment; here it looks again at the next poll, as it does where a lock is held.
+    """
+    import dbos._sys_db
+    from dbos._dbos import _get_dbos_instance
+
+    vars(dbos._sys_db)["time"] = _ShortWaits()
+    system_database = _get_dbos_instance()._sys_db
+    is_locked, is_contended = system_database.is_lock_conflict, system_database.is_serialization_conflict
+
+    def conflicts(error: Any) -> bool:
+        return is_locked(error) or is_contended(error)
+
+    vars(system_database)["is_lock_conflict"] = conflicts
+
+
+class _ShortWaits:
+    """The module `time` with a bound on `sleep`."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(time, name)
+
+    def sleep(self, seconds: float) -> None:
+        time.sleep(min(seconds, LONGEST_WAIT_SECONDS))
 
 
 def _milliseconds(database: Database) -> sa.ColumnElement[Any]:

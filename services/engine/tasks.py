@@ -61,8 +61,23 @@ class Place:
         return sa.and_(tables.tasks.c.job_id == self.job_id, tables.tasks.c.position == self.position)
 
 
+@dataclass(frozen=True, slots=True)
+class Begun:
+    """A task that a worker has begun.
+
+    Attributes:
+        task: What to make.
+        again: Whether it was begun before.
+        owner: Id of the key that submitted the job.
+    """
+
+    task: Task
+    again: bool
+    owner: str
+
+
 class Tasks:
-    """The tasks of all jobs.
+    """The tasks of all jobs. One that is tried again keeps its turn.
 
     Args:
         database: The database.
@@ -155,7 +170,7 @@ class Tasks:
 
         self._database.retry(body, PATIENCE_SECONDS)
 
-    def begin(self, claim: Claim, place: Place, errors: int = 0) -> tuple[Task, bool] | None:
+    def begin(self, claim: Claim, place: Place, errors: int = 0) -> Begun | None:
         """A worker begins a task.
 
         Args:
@@ -164,14 +179,13 @@ class Tasks:
             errors: How often it failed before.
 
         Returns:
-            The task, and whether it was begun before; None if it is at its end, or another job makes the same now:
-            then it is tried again later.
+            The task; None if it is at its end, or another job makes the same now: then it is tried again later.
 
         Raises:
             Abandoned: The claim was lost.
         """
 
-        def body(connection: sa.Connection) -> tuple[Task, bool] | None:
+        def body(connection: sa.Connection) -> Begun | None:
             job = lock_job(connection, place.job_id)
             claim.check(connection, self._database)
             row = connection.execute(sa.select(tables.tasks).where(place.row)).first()
@@ -184,7 +198,7 @@ class Tasks:
             values = {"state": "running", "executor": claim.executor, "started": time.time(), "finished": None}
             connection.execute(tables.tasks.update().where(place.row).values(**values, progress=None, note=None))
             events.add(connection, place.job_id, ("task", _event(row, "running", executor=claim.executor)))
-            return Task.model_validate(row.task), row.started is not None
+            return Begun(Task.model_validate(row.task), row.started is not None, job.submitted_by)
 
         return self._database.retry(body, PATIENCE_SECONDS)
 
@@ -228,8 +242,11 @@ class Tasks:
         found: Sequence[events.Event] = (),
         *,
         final: bool,
+        crashed: bool = False,
     ) -> None:
         """A task failed: it is queued again, or quarantined.
+
+        After a first crash it is not delayed: in the meantime its worker would begin another one, which may be long.
 
         Args:
             claim: Of the workflow that did it.
@@ -238,6 +255,7 @@ class Tasks:
             errors: How often it failed before.
             found: Events that come first.
             final: Whether another try would end the same way.
+            crashed: Whether its process ended, rather than its body.
 
         Raises:
             Abandoned: The claim was lost.
@@ -251,7 +269,9 @@ class Tasks:
                 self._quarantine(connection, row, document)
                 return
             again = _event(row, "queued", problem=document.model_dump(mode="json"))
-            self._repeat(connection, place, row, errors + 1, self._retry_seconds * 4.0**errors, again)
+            waits = errors - 1 if crashed else errors
+            delay = self._retry_seconds * 4.0**waits if waits >= 0 else 0.0
+            self._repeat(connection, place, row, errors + 1, delay, again)
 
         self._database.retry(body, PATIENCE_SECONDS)
 
@@ -393,7 +413,10 @@ class Tasks:
     ) -> None:
         prefix, numbers = prefix_of(job.id, job.attempt), dict[str, int]()
         for position, task in queued:
-            if task.role not in numbers:
+            kept = (
+                system.first_priority(connection, self._database, f"{prefix}{position}/") if tried[position] else None
+            )
+            if kept is None and task.role not in numbers:
                 numbers[task.role] = queues.next_priority(connection, self._database, task.role, job.priority, prefix)
             system.enqueue(
                 self._client,
@@ -402,10 +425,11 @@ class Tasks:
                 f"{prefix}{position}/{tried[position]}",
                 task.role,
                 *(job.id, job.attempt, position, errors),
-                priority=numbers[task.role],
+                priority=numbers[task.role] if kept is None else kept,
                 delay=delay,
             )
-            numbers[task.role] += 1
+            if kept is None:
+                numbers[task.role] += 1
 
     def _back(self, connection: sa.Connection, row: sa.Row[Any]) -> None:
         values = {"state": "queued", "executor": None, "progress": None, "finished": None, "problem": None}

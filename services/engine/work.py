@@ -22,7 +22,7 @@ from services.engine.children import Assignment, Child, ChildOptions, Hooks, Los
 from services.engine.claims import Claims
 from services.engine.events import Event
 from services.engine.states import Abandoned, Claim
-from services.engine.tasks import Place, Tasks
+from services.engine.tasks import Begun, Place, Tasks
 from services.problems import document_of, summary_of
 from services.settings import Settings
 from services.sources import materialise
@@ -126,14 +126,14 @@ class Worker:
         begun = self._tasks.begin(claim, place, errors)
         if begun is None:
             return
-        task, again = begun
+        task = begun.task
         title = f"{task.stage} {task.name}"
         reporter = _Reporter(self._tasks, claim, place, task)
         try:
             if self._storage.store.holds(task.artifact):
-                self._tasks.end(claim, place, "done" if again else "skipped", None)
+                self._tasks.end(claim, place, "done" if begun.again else "skipped", None)
                 return
-            note = self._make(claim, task, title, reporter)
+            note = self._make(claim, begun, title, reporter)
         except Lost:
             raise Abandoned(claim.workflow_id) from None
         except MissingArtifact as missing:
@@ -143,7 +143,8 @@ class Worker:
             self._tasks.fail(claim, place, problem, errors, reporter.events(), final=final)
         except problems.TaskError as error:
             log.warning("task failed", task=title, reason=error.problem.title, tries=errors + 1)
-            self._tasks.fail(claim, place, error.problem, errors, reporter.events(), final=False)
+            crashed = isinstance(error, problems.Crashed)
+            self._tasks.fail(claim, place, error.problem, errors, reporter.events(), final=False, crashed=crashed)
         except Exception as error:  # a full disk, a store that does not answer
             log.exception("task failed", task=title, tries=errors + 1)
             unexpected = problems.failed(title, summary_of(error)).problem
@@ -166,7 +167,7 @@ class Worker:
         folder = materialise(source, self._storage.blobs, self._settings.cache_folder)
         request = {"source": source.digest, "root": source.root}
         assignment = Assignment(subject=source.digest, sources={source.digest: folder})
-        options = replace(self._options, write=(), memory_bytes=self._settings.check_bytes)
+        options = replace(self._options, memory_bytes=self._settings.check_bytes)
         seconds = self._settings.check_seconds
         for left in reversed(range(CHECK_TRIES)):
             child = Child(options, self._spawner, f"check-{scene_id}")
@@ -190,10 +191,10 @@ class Worker:
                 child.stop()
             return
 
-    def _make(self, claim: Claim, task: Task, title: str, reporter: _Reporter) -> str:
+    def _make(self, claim: Claim, begun: Begun, title: str, reporter: _Reporter) -> str:
         """Has the artifact made and stored; what it took, in words."""
-        store = self._storage.store
-        assignment = self._assignment(task)
+        store, task = self._storage.store, begun.task
+        assignment = self._assignment(task, begun.owner)
         seconds = self._settings.train_seconds if task.stage == "train" else self._settings.task_seconds
         request = {"task": task.model_dump(mode="json")}
         hooks = Hooks(reporter.progress, reporter.line, reporter.tick)
@@ -210,7 +211,7 @@ class Worker:
         usage = answer["usage"]
         return f"{usage['cpu_seconds']:.1f} s CPU, {usage['peak_bytes'] / 2**20:.0f} MiB"
 
-    def _assignment(self, task: Task) -> Assignment:
+    def _assignment(self, task: Task, owner: str) -> Assignment:
         """What the process of a task sees: what the task reads, and nothing else."""
         store, checkpoints = self._storage.store, None
         sources = [source for source in (task.scene, task.bundle) if source is not None and source.files]
@@ -220,6 +221,7 @@ class Worker:
             checkpoints.mkdir(parents=True, exist_ok=True)
         return Assignment(
             subject=subject,
+            owner=owner,
             needs={need: store.fetch(need) for need in task.needs},
             sources={s.digest: materialise(s, self._storage.blobs, self._settings.cache_folder) for s in sources},
             checkpoints=checkpoints,

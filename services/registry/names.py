@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from schemas.bundle import FILES, MANIFEST
+from schemas.bundle import CARD, FILES, MANIFEST
 from schemas.problem import Problem
 from schemas.service import FileRef
 from services.store import canonical_json, file_sha256
@@ -31,7 +31,7 @@ def check_name(name: str) -> str:
 
 def bundle_files(folder: Path) -> dict[str, FileRef]:
     """The files of a bundle that are there: the manifest and those it may list, whatever else lies beside them."""
-    paths = {name: folder / name for name in (MANIFEST, *FILES)}
+    paths = {name: folder / name for name in (MANIFEST, *FILES, CARD)}
     return {
         name: FileRef(sha256=file_sha256(path), bytes=path.stat().st_size)
         for name, path in paths.items()

@@ -7,20 +7,9 @@ from pathlib import Path
 
 from schemas.problem import ExitCode, Problem
 from services.stages.desk import Desk, FolderOf
-from services.stages.tasks import version_of
+from services.stages.tasks import MODULES, version_of
 from services.store import Store
-from services.tasks import Report, StageName, Task
-
-MODULES: dict[StageName, str] = {
-    "scene": "scenes",
-    "render": "render",
-    "label": "label",
-    "train": "train",
-    "export": "export",
-    "evaluate": "evaluate",
-    "report": "report",
-}
-
+from services.tasks import Report, Task
 
 _desks: dict[Path, Desk] = {}
 
@@ -60,6 +49,6 @@ def make_at(desk: Desk, task: Task, report: Report) -> None:
             "Run the same version on all workers; a retry of the job then continues.",
             ExitCode.TRY_AGAIN,
         )
-    module = import_module(f"services.stages.{MODULES[task.stage]}")
+    module = import_module(MODULES[task.stage])
     with desk.store.put(task.address) as folder:
         module.make(desk, task, folder, report)

@@ -13,7 +13,7 @@ from renderer.context import gl_context
 from schemas.bundle import WEIGHTS, Provenance, TailSpec
 from services.registry import bundle_digest
 from services.stages.desk import BUNDLE, SHARD, Desk, load_facts, save_facts
-from services.stages.tasks import METRIC
+from services.stages.inputs import METRIC
 from services.store import file_sha256
 from services.tasks import Facts, Report, Task
 from services.versions import diaphane_version, machine
@@ -51,6 +51,7 @@ def _description(task: Task, trained: Facts, views: int) -> Description:
         provenance=Provenance(
             scenes=params["scenes"],
             holdout=params["holdout"],
+            licences=params["licences"],
             code_version=params["code"],
             seed=settings["seed"],
             machine=", ".join(machine().values()),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from renderer.usd.licence import authored_licence
 from renderer.views import placed_views, scene_views
 from schemas.view import ListedView
 from services.stages.desk import Desk, save_facts
@@ -29,5 +30,6 @@ def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
             "opaque": scene.is_opaque,
             "content": file_sha256(desk.scene_path(task)),
             "warnings": list(scene.warnings),
+            "licence": authored_licence(desk.scene_path(task)),
         },
     )

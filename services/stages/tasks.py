@@ -3,104 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
 
+from schemas.bundle import network_digest
 from schemas.pixel_weights import DEFAULT_WEIGHTS
-from schemas.tail import MetricName
 from schemas.view import View
+from services.closure import Tree
 from services.plan import Plan, PlannedScene
 from services.records import LabelledView, RenderedView, SceneEntry
+from services.stages.inputs import METRIC, REPLAYED
 from services.tasks import Source, StageName, Task
-from services.versions import code_version
-
-METRIC: MetricName = "display"
 
 EvaluationKind = Literal["baseline", "bundle"]
 
-_REPLAYED = ":replayed"
-
-_SOURCES: Mapping[StageName, tuple[str, ...]] = {
-    "scene": (
-        *("schemas.scene", "schemas.view", "schemas.colour"),
-        *("renderer.scene", "renderer.usd", "renderer.views", "renderer.convert", "renderer.authoring"),
-        "services.stages.scenes",
-    ),
-    "render": (
-        *("schemas.fragments", "schemas.tail"),
-        *(f"renderer.{name}" for name in ("capture", "csr", "culling", "dump", "fragment_list")),
-        *(f"renderer.{name}" for name in ("frame", "gpu_scene", "programs", "tile_range")),
-        *(f"renderer.shaders.{name}" for name in ("common", "opaque", "range", "capture")),
-        "services.stages.render",
-    ),
-    "label": (
-        *("labeller", "renderer.allocation", "renderer.features", "renderer.depth_bins", "renderer.tile_range"),
-        "renderer.dump",
-        *("schemas.tail", "schemas.colour", "schemas.skips", "schemas.pixel_weights"),
-        "renderer.reference.flip",
-        *("services.stages.label", "services.stages.allocations"),
-    ),
-    "train": (
-        *(f"trainer.{name}" for name in ("adam", "checkpoint", "config", "dataset", "evaluate", "heads", "loss")),
-        *(f"trainer.{name}" for name in ("models", "paper", "segments", "sgd", "train", "views", "weights")),
-        "services.stages.train",
-    ),
-    "export": (
-        *(f"trainer.{name}" for name in ("bundle", "dialects", "export_forms", "export_onnx", "export_shader")),
-        *(f"trainer.{name}" for name in ("export_ubo", "glsl_network", "half", "parity", "prune", "self_test")),
-        *("renderer.features", "renderer.onnx_network"),
-        "schemas.bundle",
-        "services.stages.export",
-    ),
-    "evaluate": (
-        *("labeller.curves", "labeller.curve_kernels"),
-        *(
-            f"renderer.{name}"
-            for name in (
-                "allocation",
-                "bands",
-                "bin_pass",
-                "depth_bins",
-                "exr",
-                "exr_header",
-                "features",
-                "metrics",
-                "onnx_network",
-                "prefix",
-                "screen",
-                "shaders",
-                "techniques",
-                "tile_range",
-            )
-        ),
-        *(f"services.stages.{name}" for name in ("evaluate", "shots", "pictures")),
-    ),
-    "report": ("services.report", "services.templates", "services.summary", "services.stages.report"),
+MODULES: Mapping[StageName, str] = {
+    "scene": "services.stages.scenes",
+    "render": "services.stages.render",
+    "label": "services.stages.label",
+    "train": "services.stages.train",
+    "export": "services.stages.export",
+    "evaluate": "services.stages.evaluate",
+    "report": "services.stages.report",
 }
-"""What decides the result of a stage: a change of any of it makes its artifacts anew."""
+"""Stage -> the module that makes it. It decides the result, with all that it imports: a change of any of that makes
+the stage's artifacts anew."""
 
 
 def version_of(stage: StageName) -> str:
     """Code version of a stage in this process: part of the address of whatever it makes."""
-    version = _versions()[stage]
-    return version + scene_version() if stage == "render" else version
+    return _versions()[0][stage]
 
 
 @cache
-def _versions() -> dict[StageName, str]:
+def _versions() -> tuple[dict[StageName, str], str]:
     """Of all stages at once: where files change under a running process, none may be newer than the others."""
-    return {stage: code_version(*sources) for stage, sources in _SOURCES.items()}
-
-
-def scene_version() -> str:
-    """Code version of whatever decides what a scene is."""
-    return version_of("scene")
+    tree = Tree()
+    stages = {stage: tree.version(module) for stage, module in MODULES.items()}
+    return stages, tree.version(MODULES["train"], MODULES["export"])
 
 
 def training_version() -> str:
     """Code version of whatever decides what a bundle is, for its provenance."""
-    return code_version(*_SOURCES["train"], *_SOURCES["export"]) + scene_version()[:8]
+    return _versions()[1]
 
 
 def scene_task(plan: Plan, scene: PlannedScene) -> Task:
@@ -158,7 +103,7 @@ def train_task(
     """
     params: dict[str, Any] = {"seed": plan.seed, "steps": plan.steps, "network": plan.network, **(config or {})}
     inputs = [f"{digest}:{artifact.partition('/')[2]}" for digest, artifact in shards]
-    inputs += [f"{digest}:{artifact.partition('/')[2]}{_REPLAYED}" for digest, artifact in plan.replayed]
+    inputs += [f"{digest}:{artifact.partition('/')[2]}{REPLAYED}" for digest, artifact in plan.replayed]
     if plan.patience:
         params["patience"] = plan.patience
     if start is not None:
@@ -177,35 +122,9 @@ def train_task(
     )
 
 
-@dataclass(frozen=True, slots=True)
-class TrainedOn:
-    """A shard that a training read.
-
-    Attributes:
-        scene: Digest of its scene.
-        artifact: Its labels, `label/key`.
-        replayed: Whether it is one that the network had learned before.
-    """
-
-    scene: str
-    artifact: str
-    replayed: bool
-
-
-def trained_on(inputs: Sequence[str]) -> list[TrainedOn]:
-    """The shards of a training, in the order of its needs.
-
-    Args:
-        inputs: Of its address.
-    """
-    found = []
-    for text in inputs:
-        scene, _, key = text.removesuffix(_REPLAYED).partition(":")
-        found.append(TrainedOn(scene, f"label/{key}", text.endswith(_REPLAYED)))
-    return found
-
-
-def export_task(plan: Plan, train: Task, scenes: Mapping[str, str], held_out: Mapping[str, str]) -> Task:
+def export_task(
+    plan: Plan, train: Task, scenes: Mapping[str, str], held_out: Mapping[str, str], licences: Mapping[str, str]
+) -> Task:
     """Writes the bundle, if its three forms agree.
 
     Args:
@@ -213,6 +132,7 @@ def export_task(plan: Plan, train: Task, scenes: Mapping[str, str], held_out: Ma
         train: The training.
         scenes: Label -> digest of what was trained on.
         held_out: Label -> digest of what was not.
+        licences: Label -> licence of all of them, as far as they are known.
     """
     return Task(
         name=plan.name,
@@ -223,6 +143,7 @@ def export_task(plan: Plan, train: Task, scenes: Mapping[str, str], held_out: Ma
             "name": plan.name,
             "scenes": dict(scenes),
             "holdout": dict(held_out),
+            "licences": dict(licences),
             "settings": plan.settings,
             "code": training_version(),
         },
@@ -251,7 +172,7 @@ def evaluate_task(
         name=f"{view.rendered.title} {'published ' if published else ''}{kind}",
         stage="evaluate",
         version=version_of("evaluate"),
-        inputs=(*made_from, bundle.digest) if bundle is not None else tuple(made_from),
+        inputs=(*made_from, _network(bundle)) if bundle is not None else tuple(made_from),
         params={
             "kind": kind,
             **_picture(plan, view.rendered.view),
@@ -289,6 +210,11 @@ def report_task(name: str, data: Mapping[str, Any], evaluations: Sequence[tuple[
         params={"data": dict(data), "labels": [label for label, _ in evaluations]},
         needs=tuple(task.artifact for _, task in evaluations),
     )
+
+
+def _network(bundle: Source) -> str:
+    """Names the network of a bundle: its pictures are the same before and after it has a model card."""
+    return network_digest(bundle.files) if bundle.files else bundle.digest
 
 
 def _picture(plan: Plan, view: View) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from schemas.bundle import WEIGHTS
 from schemas.measurement import TrainingPoint
 from services.report.live import write_live
 from services.stages.desk import SHARD, Desk, save_facts
-from services.stages.tasks import TrainedOn, trained_on
+from services.stages.inputs import TrainedOn, trained_on
 from services.tasks import Report, Source, Task
 from trainer.bundle import load_bundle
 from trainer.log import read_log

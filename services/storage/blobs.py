@@ -32,7 +32,7 @@ from typing import BinaryIO
 
 from schemas.problem import ExitCode, Problem
 from schemas.service import FileRef
-from services.store import TOUCH_SECONDS, file_sha256, sync
+from services.store import TOUCH_SECONDS, StoreAway, file_sha256, sync
 
 CHUNK = 1 << 20
 """Bytes read and written at a time."""
@@ -327,12 +327,10 @@ class Blobs:
         """Refuses to say that a blob is absent where the whole store is.
 
         Raises:
-            Problem: The store is away.
+            StoreAway: Always then.
         """
         if not self._temporary.is_dir():
-            raise Problem(
-                "The store cannot be reached.", "Mount its folder again, then repeat this.", ExitCode.TRY_AGAIN
-            )
+            raise StoreAway("The store cannot be reached.", "Mount its folder again, then repeat this.")
 
     def _touch(self, sha256: str) -> None:
         """Writes down a use, as the time of access: the time of change belongs to the verification."""

@@ -19,12 +19,17 @@ class Storage:
     blobs: Blobs
 
 
-def open_storage(settings: Settings) -> Storage:
+def open_storage(settings: Settings, patience: float = 20.0) -> Storage:
     """Opens the storage that `settings.store_url` names.
 
     `s3://bucket/prefix` is any S3-compatible object store, with a cache in `settings.cache_folder`: credentials, region
     and endpoint come from `AWS_*`; an endpoint may be plain HTTP if `AWS_ENDPOINT_URL` says so. Everything else is a
     folder, which workers on several machines may share.
+
+    Args:
+        settings: Of the service.
+        patience: Seconds for which a request to an object store that does not answer is repeated: who works waits,
+            who is asked says so.
 
     Raises:
         Problem: The URL is not understood.
@@ -36,7 +41,7 @@ def open_storage(settings: Settings) -> Storage:
         from services.storage.remote import Remote
         from services.storage.tiered import TieredBlobs, TieredStore
 
-        remote = Remote.open(url)
+        remote = Remote.open(url, patience)
         return Storage(TieredStore(settings.cache_folder, remote), TieredBlobs(settings.cache_folder, remote))
     if "://" in url and not url.startswith("file:///"):
         raise Problem(

@@ -7,18 +7,20 @@ import logging
 import os
 import threading
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
-from typing import Self
+from typing import Self, TypeVar
 
 import obstore
 from obstore.exceptions import AlreadyExistsError, BaseError, PermissionDeniedError, UnauthenticatedError
 from obstore.store import S3Store
 
 from schemas.problem import ExitCode, Problem
+from services.store import StoreAway
 
 RANGE_BYTES = 16 << 20
 """Bytes of one request when a large object is read: each request is repeated by itself if its connection is cut."""
@@ -26,10 +28,16 @@ RANGE_BYTES = 16 << 20
 USED_SECONDS = 12 * 3600.0
 """How stale the note of an object's last use may be; retention counts in days."""
 
-_RETRY_SECONDS = 20.0
+_PAUSE = timedelta(seconds=2)
+"""Longest time between two tries: a store that is back is used again within it."""
 _USED = "used"
 _FULL = ("XMinioStorageFull", "QuotaExceeded", "InsufficientStorage", "507 Insufficient Storage")
 """What servers call it."""
+
+_CUT = "HTTP error"
+"""What the client calls a connection that failed, other than an answer that tells of an error."""
+
+T = TypeVar("T")
 
 log = logging.getLogger(__name__)
 
@@ -54,16 +62,22 @@ class Remote:
 
     Args:
         store: The bucket and prefix.
+        patience: Seconds for which a request is repeated whose connection was cut; what was not connected at all, or
+            was answered with an error of the server's, the client repeats by itself.
     """
 
-    def __init__(self, store: S3Store) -> None:
-        self._store = store
+    def __init__(self, store: S3Store, patience: float = 20.0) -> None:
+        self._store, self._patience = store, patience
         self._used: dict[str, float] = {}
         self._lock = threading.Lock()
 
     @classmethod
-    def open(cls, url: str) -> Self:
+    def open(cls, url: str, patience: float = 20.0) -> Self:
         """The store that `s3://bucket/prefix` names; credentials, region and endpoint from `AWS_*`.
+
+        Args:
+            url: Of the store.
+            patience: Seconds for which a request that is not answered is repeated.
 
         Raises:
             Problem: The URL names no bucket.
@@ -76,25 +90,31 @@ class Remote:
             bucket,
             prefix=prefix.strip("/") or None,
             client_options={"allow_http": endpoint.startswith("http://"), "timeout": timedelta(minutes=5)},
-            retry_config={"max_retries": 8, "retry_timeout": timedelta(seconds=_RETRY_SECONDS)},
+            retry_config={
+                "max_retries": 10_000,
+                "retry_timeout": timedelta(seconds=patience),
+                "backoff": {"init_backoff": timedelta(seconds=0.1), "max_backoff": _PAUSE, "base": 2},
+            },
         )
-        return cls(store)
+        return cls(store, patience)
 
     def head(self, key: str) -> Entry | None:
         """The object, without its content; None if it is absent."""
         try:
-            with _reported():
-                meta = obstore.head(self._store, key)
+            meta = self._asked(lambda: obstore.head(self._store, key))
         except FileNotFoundError:
             return None
         return Entry(key, meta["size"], meta["last_modified"].timestamp())
 
     def get(self, key: str) -> tuple[bytes, float] | None:
         """Content of a small object and when it was written; None if it is absent."""
+
+        def read() -> tuple[bytes, float]:
+            result = obstore.get(self._store, key)
+            return bytes(result.bytes()), result.meta["last_modified"].timestamp()
+
         try:
-            with _reported():
-                result = obstore.get(self._store, key)
-                return bytes(result.bytes()), result.meta["last_modified"].timestamp()
+            return self._asked(read)
         except FileNotFoundError:
             return None
 
@@ -107,8 +127,8 @@ class Remote:
         while start < end:
             stop = min(end, start + RANGE_BYTES)
             try:
-                with _reported():
-                    chunk = bytes(obstore.get_range(self._store, key, start=start, end=stop))
+                read = partial(obstore.get_range, self._store, key, start=start, end=stop)
+                chunk = bytes(self._asked(read))
             except (FileNotFoundError, Problem) as error:
                 entry = self.head(key)  # some servers answer a range beyond the end with an error
                 if entry is None or entry.bytes < stop:
@@ -126,9 +146,11 @@ class Remote:
             OSError: The content cannot be read.
         """
         try:
-            with _reported():
-                source = iter(content) if not isinstance(content, bytes | Path) else content
-                obstore.put(self._store, key, source, chunk_size=RANGE_BYTES, max_concurrency=4)
+            if isinstance(content, bytes | Path):
+                self._asked(lambda: self._write(key, content))
+            else:  # it may be read once only
+                with _reported():
+                    self._write(key, iter(content))
         except FileNotFoundError as error:
             if isinstance(content, Path) and not content.exists():
                 raise
@@ -140,18 +162,26 @@ class Remote:
 
     def create(self, key: str, content: bytes) -> bool:
         """Writes an object only if it is absent; whether it was."""
-        try:
-            with _reported():
+        tries = 0
+
+        def write() -> bool:
+            nonlocal tries
+            tries += 1
+            try:
                 obstore.put(self._store, key, content, mode="create")
-        except AlreadyExistsError:
-            return False
-        return True
+            except AlreadyExistsError:
+                if tries == 1:
+                    return False
+                # The try before it may have arrived although its answer did not.
+                return bytes(obstore.get(self._store, key).bytes()) == content
+            return True
+
+        return self._asked(write)
 
     def delete(self, keys: Sequence[str]) -> None:
         """Removes objects, whether they are there or not."""
         if keys:
-            with _reported():
-                obstore.delete(self._store, list(keys))
+            self._asked(lambda: obstore.delete(self._store, list(keys)))
 
     def list(self, prefix: str) -> Iterator[Entry]:
         """All objects in a folder and those below it."""
@@ -185,6 +215,26 @@ class Remote:
             entry.key.removeprefix(f"{_USED}/"): entry.modified for entry in self.list(f"{_USED}/{prefix}".rstrip("/"))
         }
 
+    def _write(self, key: str, source: bytes | Path | Iterator[bytes]) -> None:
+        obstore.put(self._store, key, source, chunk_size=RANGE_BYTES, max_concurrency=4)
+
+    def _asked(self, request: Callable[[], T]) -> T:
+        """The answer to a request that may be sent again."""
+        end, wait = time.monotonic() + self._patience, 0.1
+        while True:
+            try:
+                with _reported():
+                    return request()
+            except _CutError:
+                if time.monotonic() + wait > end:
+                    raise
+                time.sleep(wait)
+                wait = min(_PAUSE.total_seconds(), 2.0 * wait)
+
+
+class _CutError(StoreAway):
+    """The connection was lost before the answer came."""
+
 
 @contextmanager
 def _reported() -> Iterator[None]:
@@ -204,10 +254,9 @@ def _reported() -> Iterator[None]:
         log.warning("The object store failed: %s", _first_line(error))
         if any(word in str(error) for word in _FULL):
             raise OSError(errno.ENOSPC, "the object store is full") from error
-        raise Problem(
+        raise (_CutError if _CUT in str(error) else StoreAway)(
             "The object store cannot be reached, or could not do what was asked.",
             "Check that it runs and AWS_ENDPOINT_URL is right, then try again.",
-            ExitCode.TRY_AGAIN,
         ) from error
 
 

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
-from support.chaos.arena import API, Arena
+from support.chaos.arena import Arena
+from support.cluster import API
 from support.postgres import Postgres
 
 PROCESSES = (API, "jobs", "jobs", "render", "render", "label", "train")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Options of the long runs."""
+    """Options of this folder."""
     parser.addoption("--all-points", action="store_true", help="kill at every point, not at a selection")
-    parser.addoption("--kills", type=int, default=0, help="random kills of the long run; 0: it is skipped")
-    parser.addoption("--kill-seed", type=int, default=0, help="seed of the long run")
-    parser.addoption("--most-seconds", type=float, default=420.0, help="the long run ends after so many, at the latest")
-    parser.addoption("--results", type=Path, default=None, help="folder that the long run writes its figures to")
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -8,8 +8,9 @@ from typing import Any
 
 import httpx
 import pytest
-from support.chaos.arena import API, Arena
+from support.chaos.arena import Arena
 from support.chaos.settled import require
+from support.cluster import API
 from support.workers import until
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
 from pathlib import Path
 
 import pytest
@@ -11,7 +9,6 @@ from support.chaos.arena import Arena
 from support.chaos.probe import POINTS
 from support.chaos.settled import require
 from support.postgres import Postgres
-from support.workers import until
 
 SELECTION = {
     "sqlite": (
@@ -57,23 +54,3 @@ def test_what_was_not_pushed_to_the_object_store_is_made_again(tmp_path: Path, p
             (job,) = arena.wait(job_id)
         assert (job.state, job.attempt) == ("succeeded", 1), job.problem
         require(arena, [job_id], arena.allowance)
-
-
-@pytest.mark.mainly("sqlite")
-def test_a_child_that_is_killed_alone_costs_one_try_of_its_task(arena: Arena) -> None:
-    killed = ("render:begin", "train:end")
-    with arena.gates(*killed):
-        job_id = arena.submit("children", seed=2)
-        for point in killed:
-            child = arena.reached(point)["pid"]
-            os.kill(child, signal.SIGKILL)
-            arena.open(point)
-            until(lambda child=child: "SIGKILL" in _problems(arena, job_id), 20.0)
-        (job,) = arena.wait(job_id)
-    assert job.state == "succeeded", job.problem
-    found = require(arena, [job_id], len(killed))
-    assert found.bodies == found.artifacts + len(killed)
-
-
-def _problems(arena: Arena, job_id: str) -> str:
-    return str([event.data.get("problem") for event in arena.service.jobs.events(job_id)])

@@ -39,7 +39,9 @@ def subject(gpu: GpuScene) -> Subject:
 
 @pytest.fixture(scope="module")
 def options() -> BenchOptions:
-    return BenchOptions((), NAMES, Path("unused"), budgets=(1.0, 2.0), tails=("density", "paper"), path=2, repeats=2)
+    return BenchOptions(
+        (), NAMES, Path("unused"), budgets=(1.0, 2.0), tails=("density", "paper"), path=2, repeats=2, account=False
+    )
 
 
 @pytest.fixture(scope="module")
@@ -147,7 +149,7 @@ def test_where_another_memory_holds_the_same_fragments_nothing_is_rendered_again
         return first(run, *given)
 
     monkeypatch.setattr(Run, "first", counted)
-    options = BenchOptions((), ("kbuffer",), Path("unused"), budgets=(4.0, 5.0))
+    options = BenchOptions((), ("kbuffer",), Path("unused"), budgets=(4.0, 5.0), account=False)
     _, cells = Bench(subject, options, None).measure(planned(options, None))
     assert len(pictured) == 2
     for factor in (4.0, 5.0):
@@ -166,7 +168,7 @@ def test_where_the_buffers_of_the_pixels_leave_nothing_it_says_so(
     subject: Subject, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("renderer.techniques.kbuffer_importance._FACING_BYTES", 100)
-    options = BenchOptions((), ("kbuffer-importance",), Path("unused"), budgets=(0.5,))
+    options = BenchOptions((), ("kbuffer-importance",), Path("unused"), budgets=(0.5,), account=False)
     _, cells = Bench(subject, options, None).measure(planned(options, None))
     assert cells[0].problem is None
     assert cells[1].problem == "the buffers of the pixels alone take more than this memory"
@@ -206,7 +208,7 @@ def test_what_learns_from_its_frames_is_measured_when_it_has_settled(subject: Su
 
 
 def test_a_picture_that_is_not_finite_is_no_result(subject: Subject, monkeypatch: pytest.MonkeyPatch) -> None:
-    options = BenchOptions((), ("kbuffer",), Path("unused"), budgets=(1.0,))
+    options = BenchOptions((), ("kbuffer",), Path("unused"), budgets=(1.0,), account=False)
 
     def wrong(*_: object) -> Rendered:
         broken = np.full((SIZE[1], SIZE[0], 3), np.nan, np.float32)

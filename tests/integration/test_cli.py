@@ -17,6 +17,7 @@ from support.bundles import make_bundle
 from support.measured import example
 
 import services
+from schemas.bundle import CARD, write_card
 from schemas.measurement import RegistryResult
 from schemas.problem import ExitCode, Problem
 from services.cli.app import run
@@ -66,6 +67,7 @@ def succeed(options: BuildOptions, progress: Progress) -> BuildResult:
     return BuildResult(
         report=options.state / "report.html",
         dataset=options.state / "datasets" / options.name,
+        licences="Commercial use is allowed by the licences of all 2 training scenes.",
         registry=RegistryResult(
             reference=f"{options.name}@1.0.0", folder="folder", champion=True, reason="It is the first version."
         ),
@@ -112,6 +114,7 @@ def test_build_passes_its_options_on(pipeline: Callable[[Build], list[BuildOptio
     asked = pipeline(succeed)
     options = ["--alpha", "0.33", "--holdout", "bottles.usda", "--size", "64x48", "--tail", "binned-8", "--g", "0.5"]
     options += ["--seed", "7", "--steps", "9", "--views-per-scene", "2", "--state", "state"]
+    options += ["--licence", "CC0", "--licence", "bottles=CC-BY-4.0, Jane"]
     assert run([*BUILD, *options]) == ExitCode.OK
     assert asked == [
         BuildOptions(
@@ -119,6 +122,7 @@ def test_build_passes_its_options_on(pipeline: Callable[[Build], list[BuildOptio
             name="glass",
             budgets=(1.0, 2.0),
             holdout=(Path("bottles.usda"),),
+            licences={Path("bottles.usda"): "CC-BY-4.0, Jane", Path("foliage.usda"): "CC0"},
             alpha=0.33,
             views_per_scene=2,
             width=64,
@@ -178,6 +182,7 @@ def test_the_state_folder_comes_from_the_environment(
     [
         (["build", "nowhere.usda", "--name", "glass"], ExitCode.NOT_FOUND, "no file nowhere.usda"),
         ([*BUILD, "--budgets", "0"], ExitCode.USAGE, "A budget of 0 "),
+        ([*BUILD, "--licence", "potles=CC0"], ExitCode.USAGE, "--licence 'potles=CC0' names no licence of a scene"),
         ([*BUILD, "--budgets", "one"], ExitCode.USAGE, "not a list of numbers"),
         ([*BUILD, "--budgets", "1e-9"], ExitCode.USAGE, "less than one fragment of a picture of 1430x960 pixels"),
         ([*BUILD, "--from", ""], ExitCode.USAGE, "--from is empty"),
@@ -255,11 +260,14 @@ def test_version_names_the_libraries(capsys: pytest.CaptureFixture[str]) -> None
     assert "numpy " in capsys.readouterr().out
 
 
-def publish(folder: Path, weights: str, score: float | None) -> None:
+def publish(folder: Path, weights: str, score: float | None, card: str | None = None) -> None:
     settings = Settings(state=folder / ".diaphane")
     database = open_database(settings.database_url)
     registry = open_registry(database, open_storage(settings).blobs, settings)
-    publication = registry.publish("glass", make_bundle(folder / f"bundle-{weights}", weights), score, {})
+    bundle = make_bundle(folder / f"bundle-{weights}", weights)
+    if card is not None:
+        write_card(bundle, card)
+    publication = registry.publish("glass", bundle, score, {})
     champion = registry.champion("glass")
     registry.consider(publication, score, champion.score if champion else None)
     database.close()
@@ -269,7 +277,7 @@ def test_models_are_listed_shown_promoted_and_rolled_back(folder: Path, capsys: 
     assert run(["models", "list"]) == ExitCode.OK
     assert "No bundle is published" in capsys.readouterr().err
     publish(folder, "a", 0.5)
-    publish(folder, "b", None)
+    publish(folder, "b", None, "# Model card: glass\n")
     assert run(["models", "list"]) == ExitCode.OK
     assert capsys.readouterr().out == "glass  latest 1.1.0  champion 1.0.0\n"
     assert run(["models", "promote", "glass", "1.1.0", "--reason", "smaller"]) == ExitCode.OK
@@ -277,6 +285,8 @@ def test_models_are_listed_shown_promoted_and_rolled_back(folder: Path, capsys: 
     shown = capsys.readouterr().out
     assert "glass@1.0.0  score 0.5" in shown
     assert "glass@1.1.0  score none" in shown
+    assert shown.count("Commercial use is NOT CLEARED: 1 of 1 training scenes have no licence that is known") == 2
+    assert f"registry/glass/1.1.0/{CARD}" in shown
     assert "champion: 1.0.0 -> 1.1.0" in shown
     assert "smaller" in shown
     assert run(["models", "list", "--json"]) == ExitCode.OK
@@ -284,6 +294,7 @@ def test_models_are_listed_shown_promoted_and_rolled_back(folder: Path, capsys: 
     assert run(["models", "show", "glass@1.0.0", "--json"]) == ExitCode.OK
     (version,) = json.loads(capsys.readouterr().out)["versions"]
     assert version["score"] == 0.5
+    assert CARD not in version["files"]
     assert Path(version["folder"]).is_dir()
     assert run(["models", "rollback", "glass", "--reason", "flickers"]) == ExitCode.OK
     assert capsys.readouterr().out == "glass@1.0.0 is the champion.\n"

@@ -19,6 +19,7 @@ from benchmarks import suite
 from benchmarks.casting.cases import Case
 from benchmarks.comparing import scenes
 from benchmarks.comparing.scenes import PATH_FRAMES, SHARED, cases_of, parts_of
+from labeller.budgets import default_budgets
 from renderer import capture, exact_bytes
 from renderer.samples import SAMPLES
 from renderer.samples.deep import DEEP
@@ -32,7 +33,7 @@ from services.cli.app import run
 from services.summary import UNFIT, said_unfit
 
 ROOT = Path(services.__file__).parent.parent
-FAST = ["--size", "48x32", "--repeats", "1", "--alpha", ".33", "--equal-fragments"]
+FAST = ["--size", "48x32", "--repeats", "1", "--alpha", ".33", "--equal-fragments", "--no-account"]
 
 
 @pytest.fixture(scope="module")
@@ -66,9 +67,13 @@ def test_it_prints_tables_and_leaves_json_plots_and_a_page(
         "sbuffer,moment,kbuffer,kbuffer-optimal",
         "--budgets",
         "1",
+        "--account",
+        "--bandwidth",
+        "250",
     ]
     assert run(command) == ExitCode.OK
     out = capsys.readouterr().out
+    assert "at 250 GB/s and 50 Gfragments/s, no prediction" in out
     assert "nested_shells, alpha 0.33, 48x32: 1 view" in out
     assert "Algorithm 1 (offline), weighted-average tail" in out
     assert out.strip().endswith("out/index.html")
@@ -76,10 +81,34 @@ def test_it_prints_tables_and_leaves_json_plots_and_a_page(
     cells = {cell.technique: cell for cell in result.views[0].cells}
     assert cells["sbuffer"].mse == 0.0
     assert 0.0 < (cells["kbuffer-optimal"].score or 0.0) <= (cells["kbuffer"].score or 0.0)
+    assert cells["sbuffer"].work["capture"].atomics == result.views[0].fragments
+    assert cells["kbuffer-optimal"].work.keys() == cells["kbuffer-optimal"].passes.keys() - {"opaque", "readback"}
+    assert result.device.bandwidth == 250.0
     for plot in ("time-error", "error-bytes", "figure6"):
         assert json.loads((folder / "out" / f"{plot}.vl.json").read_text())["data"]["values"]
-    assert "<svg" in (folder / "out" / "index.html").read_text()
+    page = (folder / "out" / "index.html").read_text()
+    assert "<svg" in page
+    assert "Work of a frame, counted" in page
+    assert "250 GB/s and 50 Gfragments/s" in page
     assert not (folder / ".diaphane").exists(), "it runs without state"
+
+
+def test_budgets_that_are_not_given_follow_from_each_scene_and_opacity(
+    scene: Path, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["bench", str(scene), "--size", "48x32,32x48", "--repeats", "1", "--equal-fragments", "-t", "kbuffer"]
+    assert run([*command, "-o", "out", "--budgets", "64"]) == ExitCode.OK
+    said = capsys.readouterr().err
+    assert "nested_shells, authored alpha: The budget 64 holds all fragments" in said
+    assert run([*command, "-o", "out", "--fresh"]) == ExitCode.OK
+    said = capsys.readouterr().err
+    assert "nested_shells, authored alpha: Budgets " in said
+    assert "because the 2 views to measure hold " in said
+    views = BenchResult.model_validate_json((folder / "out" / "bench.json").read_text()).views
+    factors = [{cell.budget_factor for cell in view.cells} for view in views]
+    loads = [view.fragments / (view.width * view.height) for view in views]
+    assert factors == [set(default_budgets(loads))] * 2
+    assert not any(cell.exact for view in views for cell in view.cells if cell.budget_factor == min(factors[0]))
 
 
 def test_what_was_measured_is_not_measured_again(scene: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -510,6 +510,7 @@ def test_the_models_of_a_server_are_listed_shown_promoted_and_rolled_back(
     shown = capsys.readouterr().out
     assert shown.index("glass@1.0.0  score 0.5") < shown.index("glass@1.2.0  score 0.3")
     assert "champion: 1.2.0 -> 1.0.0  by key: flickers" in shown
+    assert shown.count("NOT CLEARED: 1 of 1 training scenes forbid it by their licence (vase).") == 3
     assert run(["models", "show", "glass@champion", "--json"]) == ExitCode.OK
     assert [v["version"] for v in json.loads(capsys.readouterr().out)["versions"]] == ["1.0.0"]
 

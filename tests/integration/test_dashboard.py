@@ -278,6 +278,8 @@ def test_pages_with_data(admin: Visitor, shown: Shown) -> None:
     assert model.count("<svg") > 3
     assert "<dd>18, " in model  # weights: 1 -> 4 -> 2 with biases
     assert "12 a pixel" in model
+    assert "Commercial use is NOT CLEARED: 1 of 1 training scenes have no licence" in model
+    assert '<pre class="card"># Model card: glass' in model
     scene = text[f"/scenes/{shown.scene}"]
     assert "1 234 567" in scene
     assert "<td>0.250</td><td>0.200</td><td>2.00e-01</td>" in scene

@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 import sqlalchemy as sa
 from dbos import DBOS, DBOSConfig, DBOSPortableJSONSerializer
+from psycopg.errors import DiskFull, LockNotAvailable, SerializationFailure
+from sqlalchemy.exc import DBAPIError
 
 from services.database import Database, open_database, tables
 from services.database.clock import clock
@@ -106,6 +108,36 @@ def test_a_dead_process_of_the_same_host_is_seen_without_patience(engine: Engine
     _insert_executor(engine.database, "gone", where=host(), pid=2**22 + 1, started="1", age=0.0)
     engine.claimed_by("gone")
     assert engine.liveness.reap(patient=False) == ["gone"]
+
+
+def test_rows_of_processes_that_have_ended_go_once_nothing_is_claimed_by_them(engine: Engine) -> None:
+    engine.enqueue()
+    _insert_executor(engine.database, "gone", where=host(), pid=2**22 + 1, started="1", age=0.0)
+    _insert_executor(engine.database, "owner", where=host(), pid=2**22 + 1, started="1", age=0.0)
+    _insert_executor(engine.database, "elsewhere", where="elsewhere", pid=2**22 + 1, started="1", age=0.0)
+    engine.claimed_by("owner")
+    engine.liveness._forget()
+    with engine.database.read() as connection:
+        left = set(connection.scalars(sa.select(tables.executors.c.id)))
+    assert left == {"owner", "elsewhere", engine.liveness.executor}
+
+
+def test_waits_for_the_database_are_short_and_contention_is_looked_at_again_soon(engine: Engine) -> None:
+    from dbos import _sys_db
+    from dbos._dbos import _get_dbos_instance
+
+    system.bound_waits()
+    slept: list[float] = []
+    assert _sys_db.time.time() > 0.0
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(system.time, "sleep", slept.append)
+        _sys_db.time.sleep(90.0)
+        _sys_db.time.sleep(0.5)
+    assert slept == [system.LONGEST_WAIT_SECONDS, 0.5]
+    database = _get_dbos_instance()._sys_db
+    assert database.is_lock_conflict(DBAPIError("", None, SerializationFailure()))
+    assert database.is_lock_conflict(DBAPIError("", None, LockNotAvailable()))
+    assert not database.is_lock_conflict(DBAPIError("", None, DiskFull()))
 
 
 def test_recovering_the_dead_again_leaves_what_somebody_else_has_claimed(engine: Engine) -> None:

@@ -9,10 +9,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from support.chaos.arena import API, Arena
+from support.chaos.arena import Arena
+from support.cluster import API
 from support.postgres import Postgres
 
-from services.stages.tasks import TrainedOn, trained_on
+from services.stages.inputs import TrainedOn, trained_on
 
 
 @pytest.fixture(scope="module", params=["sqlite", "postgresql"])

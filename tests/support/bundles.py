@@ -23,7 +23,12 @@ TOLERANCE = 1e-4
 
 
 def make_bundle(
-    folder: Path, weights: str = "a", *, parity: float = 1e-6, scenes: dict[str, str] | None = None
+    folder: Path,
+    weights: str = "a",
+    *,
+    parity: float = 1e-6,
+    scenes: dict[str, str] | None = None,
+    licences: dict[str, str] | None = None,
 ) -> Path:
     """Writes a bundle into a new folder.
 
@@ -32,6 +37,7 @@ def make_bundle(
         weights: Content of its weights; bundles with the same weights are the same bundle.
         parity: Difference between torch and GLSL; `TOLERANCE` is allowed.
         scenes: Training scenes by name and hash.
+        licences: Their licences by name.
     """
     folder.mkdir(parents=True)
     for name in FILES:
@@ -52,7 +58,13 @@ def make_bundle(
         parity=ParityReport(
             count=10, tolerance=TOLERANCE, torch_onnx=1e-7, torch_glsl=parity, torch_ubo=0.0, driver="llvmpipe"
         ),
-        provenance=Provenance(scenes=scenes or {"bottles": "0" * 64}, code_version="v1", seed=0, machine="a machine"),
+        provenance=Provenance(
+            scenes=scenes or {"bottles": "0" * 64},
+            licences=licences or {},
+            code_version="v1",
+            seed=0,
+            machine="a machine",
+        ),
         evaluation={"views": 2},
     )
     (folder / MANIFEST).write_text(manifest.model_dump_json(indent=2))

@@ -11,6 +11,7 @@ import numpy as np
 from fastapi.testclient import TestClient
 from PIL import Image
 
+from schemas.bundle import write_card
 from schemas.service import ProblemDocument
 from services.database import tables
 from services.stages.desk import save_facts
@@ -161,7 +162,9 @@ def _evaluation(api: Api) -> Task:
 def _models(api: Api, folder: Path, evaluate: Task, digest: str, said: str) -> None:
     registry, measured = api.service.registry, api.service.measured
     for number, weights in enumerate("abc"):
-        registry.publish("glass", make_bundle(folder / weights, weights), 0.5 + 0.1 * number, {"views": ["a"]})
+        bundle = make_bundle(folder / weights, weights)
+        write_card(bundle, "# Model card: glass\n\n## What it is for\n\nGlass.\n")
+        registry.publish("glass", bundle, 0.5 + 0.1 * number, {"views": ["a"]})
         registry.promote("glass", f"1.{number}.0", f"{said} {number}", who="key_000000000000")
     digests = {"bottles": digest, said: "1" * 64}
     size = {"width": SIZE[0], "height": SIZE[1], "k_min": 1, "k_max": 9, "total_bytes": 1 << 20}

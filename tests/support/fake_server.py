@@ -120,6 +120,7 @@ class FakeServer:
         version = f"1.{sum(v['name'] == name for v in self.versions)}.0"
         parity = {"torch_onnx": 1e-7, "torch_glsl": 1e-6, "tolerance": 1e-4}
         record = {"name": name, "version": version, "digest": "d" * 64, "score": score, "created": NOW}
+        record |= {"provenance": {"scenes": {"vase": "0" * 64}, "licences": {"vase": "CC-BY-NC-4.0"}}, "files": {}}
         self.versions.append({**record, "parity": parity, "job_id": job_id, "aliases": []})
         return version
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from schemas.bundle import CARD
 from schemas.measurement import Measurement
 from schemas.service import DatasetRecord, SceneRecord, ShardRef
 from schemas.tail import DEFAULT_TAIL, DENSITY_G
 from services.progress import SilentProgress
+from services.stages.desk import BUNDLE
 from services.tasks import Facts, StageName, Task
+from support.bundles import make_bundle
 
 VIEW = {"eye": (0.0, 0.0, 5.0), "target": (0.0, 0.0, 0.0), "up": (0.0, 1.0, 0.0)}
 TECHNIQUES = {"kbuffer": 4e-5, "kbuffer-importance": 2e-5, "kbuffer-optimal": 1e-6, "kbuffer-deep": 1e-5}
@@ -48,11 +52,12 @@ def measurement(technique: str, mse: float, factor: float = 1.0, view: str = "vi
 
 
 class TableRunner:
-    """Answers every task; `fails` names those that fail, `opaque` and `empty` what is in scenes and views.
+    """Answers every task; `fails` names those that fail; `opaque`, `empty`, `totals`, `licences`: of scenes and views.
 
     Attributes:
         asked: Every task, in order.
         published: What was published.
+        cards: The model cards of that.
     """
 
     def __init__(self, champion: Any = None, fails: Sequence[tuple[str, str]] = ()) -> None:
@@ -62,6 +67,10 @@ class TableRunner:
         self.fails = set(fails)
         self.opaque: set[str] = set()
         self.empty: set[str] = set()
+        self.totals: dict[str, int] = {}
+        self.licences: dict[str, str] = {}
+        self.cards: list[str] = []
+        self._work = tempfile.TemporaryDirectory()
         self.bundle_mse = 1e-5
         self.rival_mse = 3e-5
         self.asked: list[Task] = []
@@ -70,7 +79,8 @@ class TableRunner:
         self.considered: list[tuple[float | None, float | None, bool]] = []
         self.recorded: list[tuple[str, int, str | None]] = []
         self.shards: list[ShardRef] = []
-        self.store = SimpleNamespace(fetch=lambda artifact: Path(artifact))
+        self.settings: dict[str, Any] = {}
+        self.store = SimpleNamespace(fetch=self._fetch)
         self.blobs = SimpleNamespace(put_file=lambda path: SimpleNamespace(sha256="a" * 64))
         self.registry = SimpleNamespace(
             champion=lambda name: champion,
@@ -108,9 +118,14 @@ class TableRunner:
                 "opaque": task.name in self.opaque,
                 "content": task.inputs[0],
                 "warnings": [],
+                "licence": self.licences.get(task.name, ""),
             }
         if task.stage == "render":
-            return {"total": 0 if task.name in self.empty else 1000, "occupied": 10, "passes": {}}
+            return {
+                "total": 0 if task.name in self.empty else self.totals.get(task.name, 1000),
+                "occupied": 10,
+                "passes": {},
+            }
         if task.stage == "label":
             count = len(task.params["budgets"])
             certificate = {"error": 1.0, "bound": 1.0, "gap": 0.0}
@@ -123,7 +138,7 @@ class TableRunner:
         if task.stage == "train":
             return {"history": [{"step": 1, "loss": 1.0, "over_optimum": 2.0}], "config": {}}
         if task.stage == "export":
-            return {"digest": "e" * 64, "files": {"manifest.json": "f" * 64}, "parity": 1e-7}
+            return {"digest": "e" * 64, "files": {"weights.safetensors": "f" * 64}, "parity": 1e-7}
         if task.stage == "evaluate":
             return {"measurements": self._measurements(task)}
         return {"sha256": "a" * 64, "bytes": 10}
@@ -135,7 +150,17 @@ class TableRunner:
         own = any(need.startswith("export/") for need in task.needs)
         return [measurement("kbuffer-deep", self.bundle_mse if own else self.rival_mse, view=view)]
 
+    def _fetch(self, artifact: str) -> Path:
+        """Folder of an artifact: that of an export holds a bundle of its provenance, others are not there."""
+        exported = next((task for task in self.of("export") if task.artifact == artifact), None)
+        if exported is None:
+            return Path(artifact)
+        folder = Path(self._work.name) / artifact
+        make_bundle(folder / BUNDLE, scenes=exported.params["scenes"], licences=exported.params["licences"])
+        return folder
+
     def _publish(self, name: str, folder: Path, score: float | None, evaluation: Any, **more: Any) -> Any:
+        self.cards.append((folder / CARD).read_text(encoding="utf-8"))
         self.published.append({"name": name, "folder": folder, "score": score, "evaluation": evaluation, **more})
         return SimpleNamespace(name=name, version="1.0.0", digest="e" * 64)
 
@@ -152,7 +177,7 @@ class TableRunner:
         self.recorded.append((artifact, len(measured), model))
 
     def _dataset(self, settings: Any, shards: Sequence[ShardRef], job: Any) -> Any:
-        self.shards = list(shards)
+        self.settings, self.shards = dict(settings), list(shards)
         return SimpleNamespace(id="dst_" + "0" * 32)
 
     def _known_dataset(self, _dataset_id: str) -> DatasetRecord:

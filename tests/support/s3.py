@@ -21,9 +21,8 @@ class S3Server:
     """An S3 server whose content is lost with it."""
 
     def __init__(self) -> None:
-        self._server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
-        self._server.start()
-        self.endpoint = "http://{}:{}".format(*self._server.get_host_and_port())
+        self._server, self._port = _started(0)
+        self.endpoint = f"http://127.0.0.1:{self._port}"
 
     @property
     def environment(self) -> dict[str, str]:
@@ -37,7 +36,18 @@ class S3Server:
         return name
 
     def stop(self) -> None:
+        """Ends it; `start` brings it back at the same address, with what it held: that is in this process."""
         self._server.stop()
+
+    def start(self) -> None:
+        """After `stop`."""
+        self._server, self._port = _started(self._port)
+
+
+def _started(port: int) -> tuple[ThreadedMotoServer, int]:
+    server = ThreadedMotoServer(ip_address="127.0.0.1", port=port, verbose=False)
+    server.start()
+    return server, server.get_host_and_port()[1]
 
 
 @contextmanager

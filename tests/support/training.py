@@ -15,8 +15,20 @@ from labeller.curves import error_curves, whole_bins
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
 from renderer.features import FEATURES, derive, gather
-from schemas.bundle import GLSL, MANIFEST, HeadName, OutputName, Provenance, TailSpec, file_spec, load_manifest
+from schemas.bundle import (
+    GLSL,
+    MANIFEST,
+    FeatureSpec,
+    HeadName,
+    OutputName,
+    Provenance,
+    TailSpec,
+    file_spec,
+    layer_specs,
+    load_manifest,
+)
 from schemas.tail import DEFAULT_TAIL, TailName
+from support.bundles import make_bundle
 from support.dumps import random_dump
 from trainer.bundle import Description, export_bundle
 from trainer.dataset import ViewData, make_view
@@ -90,6 +102,20 @@ def export_random(
         evaluation={},
     )
     export_bundle(folder, network, description, features, gl)
+
+
+def write_unproven(folder: Path, network: Weights) -> Path:
+    """A bundle of which manifest and GLSL alone are the network's, in a new folder: nothing is compared, it is fast."""
+    manifest = load_manifest(make_bundle(folder))
+    (folder / GLSL).write_text(shader_source(network), encoding="utf-8")
+    update = {
+        "features": tuple(FeatureSpec(name=name, mean=0.0, std=1.0) for name in network.features),
+        "hidden": network.hidden,
+        "layers": layer_specs(len(network.features), network.hidden, len(network.outputs)),
+        "files": {**manifest.files, GLSL: file_spec(folder / GLSL)},
+    }
+    (folder / MANIFEST).write_text(manifest.model_copy(update=update).model_dump_json(), encoding="utf-8")
+    return folder
 
 
 def export_overflowing(folder: Path, network: Weights, features: NDArray[np.float32], gl: moderngl.Context) -> None:

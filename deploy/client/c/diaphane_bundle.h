@@ -41,7 +41,7 @@ enum {
     DIAPHANE_MAX_UNITS = 1024,   /* of a layer */
     DIAPHANE_MAX_LAYERS = 9,     /* hidden ones and the last */
     DIAPHANE_MAX_OUTPUTS = 3,
-    DIAPHANE_MAX_FILES = 11,
+    DIAPHANE_MAX_FILES = 12,
     DIAPHANE_MAX_MANIFEST_BYTES = 1 << 20,
     DIAPHANE_MAX_FILE_BYTES = 64 << 20
 };
@@ -516,10 +516,13 @@ static double *dia__rows(const dia__json *json, size_t value, size_t columns, si
 
 /* ---- the manifest ---- */
 
-/* The first seven, and if the network bears float16, all. */
+enum { DIA__FLOAT_FILES = 7, DIA__HALF_FILES = 4 };
+
+/* Those in float32, those in float16, if the network bears that, and a model card, if there is one. */
 static const char *const dia__files[DIAPHANE_MAX_FILES] = {
     "weights.safetensors", "model.onnx", "predict.glsl", "predict_ubo.glsl", "predict_ubo.bin", "predict.wgsl",
-    "predict.hlsl", "predict_half.glsl", "predict_ubo_half.glsl", "predict_ubo_half.bin", "predict_half.wgsl"};
+    "predict.hlsl", "predict_half.glsl", "predict_ubo_half.glsl", "predict_ubo_half.bin", "predict_half.wgsl",
+    "model_card.md"};
 
 static float dia__larger(float x, float y) { return x > y ? x : y; }
 
@@ -738,14 +741,18 @@ static int dia__read_layers(DiaphaneBundle *bundle, const dia__json *json, Diaph
 }
 
 static int dia__read_files(DiaphaneBundle *bundle, const dia__json *json, DiaphaneError *error) {
-    size_t files = dia__member(json, 0, "files"), count = json->value[files].count, i;
-    int expected = count == 7 || count == DIAPHANE_MAX_FILES;
-    if (json->value[files].kind != DIA__OBJECT || !expected)
+    size_t files = dia__member(json, 0, "files"), count = json->value[files].count, networks, i;
+    if (json->value[files].kind != DIA__OBJECT)
         return dia__fail(error, "manifest.json: files are not those of a bundle");
-    bundle->files = (int)count;
-    for (i = 0; i < count; ++i) {
+    networks = count - (dia__member(json, files, dia__files[DIAPHANE_MAX_FILES - 1]) != 0);
+    if (networks != DIA__FLOAT_FILES && networks != DIA__FLOAT_FILES + DIA__HALF_FILES)
+        return dia__fail(error, "manifest.json: files are not those of a bundle");
+    bundle->files = 0;
+    for (i = 0; i < DIAPHANE_MAX_FILES; ++i) {
         size_t file = dia__member(json, files, dia__files[i]), digit;
-        DiaphaneFile *target = &bundle->file[i];
+        DiaphaneFile *target = &bundle->file[bundle->files];
+        if (i >= networks && (i < DIAPHANE_MAX_FILES - 1 || networks == count)) continue;
+        ++bundle->files;
         target->name = dia__files[i];
         if (!file || !dia__has_keys(json, file, "sha256 bytes") ||
             !dia__whole(json, dia__member(json, file, "bytes"), DIAPHANE_MAX_FILE_BYTES, &target->bytes) ||

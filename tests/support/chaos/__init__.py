@@ -8,5 +8,4 @@ Modules:
     disk        a store that can be full
     arena       the processes, their database and store
     settled     what must hold once the jobs have ended
-    storm       random kills while jobs keep coming
 """

@@ -48,7 +48,7 @@ def _scene(task: Any, folder: Path, desk: Any) -> dict[str, Any]:
         {"name": f"view{index}", "eye": (0.0, index, 5.0 + seed), "target": (0.0, 0.0, 0.0), "up": (0.0, 1.0, 0.0)}
         for index in range(task.params["count"])
     ]
-    return {"views": views, "triangles": 12, "opaque": False, "content": task.inputs[0], "warnings": []}
+    return {"views": views, "triangles": 12, "opaque": False, "content": task.inputs[0], "warnings": [], "licence": ""}
 
 
 def _render(task: Any, folder: Path, desk: Any) -> dict[str, Any]:

@@ -1,55 +1,16 @@
-"""What must hold once jobs have ended, whatever was done to the processes meanwhile."""
+"""What must hold of stand-ins: that of all jobs, and contents, bodies and measurements as they should be."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import sqlalchemy as sa
 
 from services.database import tables
-from services.store import MissingArtifact
 from services.tasks import FACTS
 from support.chaos.arena import Arena
 from support.chaos.bodies import DATA, TECHNIQUES, content
-
-
-@dataclass
-class Settled:
-    """What was found.
-
-    Attributes:
-        jobs: Jobs that were looked at.
-        lost: Those that did not succeed, with the reason.
-        published: Versions of them.
-        twice: Bundles with more than one version, and jobs with more than one version or none.
-        pending: Tasks that still wait or run.
-        quarantined: Tasks that were given up.
-        damaged: Artifacts that are missing or do not have the content that they should.
-        artifacts: How many different artifacts the jobs are made of.
-        bodies: How often a body began, whatever became of what it made.
-        events: Jobs whose events have gaps, or more than one end.
-        records: Evaluations whose measurements are not there exactly once.
-    """
-
-    jobs: int = 0
-    lost: list[str] = field(default_factory=list)
-    published: int = 0
-    twice: list[str] = field(default_factory=list)
-    pending: list[str] = field(default_factory=list)
-    quarantined: list[str] = field(default_factory=list)
-    damaged: list[str] = field(default_factory=list)
-    artifacts: int = 0
-    bodies: int = 0
-    events: list[str] = field(default_factory=list)
-    records: list[str] = field(default_factory=list)
-
-    @property
-    def faults(self) -> dict[str, list[str]]:
-        """What should be empty and is not."""
-        kinds = ("lost", "twice", "pending", "quarantined", "damaged", "events", "records")
-        return {kind: getattr(self, kind) for kind in kinds if getattr(self, kind)}
+from support.settled import Settled, settled
 
 
 def look(arena: Arena, job_ids: Sequence[str], since: int = 0) -> Settled:
@@ -60,15 +21,11 @@ def look(arena: Arena, job_ids: Sequence[str], since: int = 0) -> Settled:
         job_ids: Jobs of different specs, all that ran meanwhile.
         since: Lines of the trace that came before.
     """
-    found = Settled(jobs=len(job_ids))
-    artifacts = _look_at_tasks(arena, job_ids, found)
-    found.artifacts = len(artifacts)
+    found, artifacts = settled(arena.service, job_ids)
     lines = arena.trace()[since:]
     found.bodies = sum("artifact" in line and line["point"].endswith(":begin") for line in lines)
-    _look_at_versions(arena, job_ids, found)
-    for job_id in job_ids:
-        _look_at_events(arena, job_id, found)
-    found.damaged += [artifact for artifact in sorted(artifacts) if not _is_whole(arena, artifact)]
+    whole = artifacts - set(found.damaged)
+    found.damaged += [artifact for artifact in sorted(whole) if not _is_as_made(arena, artifact)]
     _look_at_measurements(arena, job_ids, found)
     return found
 
@@ -88,59 +45,9 @@ def require(arena: Arena, job_ids: Sequence[str], in_vain: int) -> Settled:
     return found
 
 
-def _look_at_tasks(arena: Arena, job_ids: Sequence[str], found: Settled) -> set[str]:
-    artifacts: set[str] = set()
-    for job_id in job_ids:
-        for task in arena.service.jobs.tasks(job_id, limit=10_000):
-            title = f"{job_id} {task.stage} {task.name}"
-            if task.state == "quarantined":
-                reason = "" if task.problem is None else task.problem.detail
-                found.quarantined.append(f"{title}: {reason}")
-            elif task.state not in ("done", "skipped"):
-                found.pending.append(f"{title}: {task.state}")
-            else:
-                artifacts.add(task.artifact)
-    return artifacts
-
-
-def _look_at_versions(arena: Arena, job_ids: Sequence[str], found: Settled) -> None:
-    jobs = [arena.job(job_id) for job_id in job_ids]
-    for job in jobs:
-        if job.state != "succeeded":
-            detail = "" if job.problem is None else job.problem.detail
-            found.lost.append(f"{job.id} {job.state} at attempt {job.attempt}: {detail}")
-    registry, mine = arena.service.registry, set(job_ids)
-    for name in sorted({str(job.name) for job in jobs}):
-        records = [registry.record(publication) for publication in registry.versions(name)]
-        own = [record for record in records if record.job_id in mine]
-        found.published += len(own)
-        for record in own:
-            registry.folder(next(p for p in registry.versions(name) if p.version == record.version))
-        digests = Counter(record.digest for record in records)
-        found.twice += [f"{name}: {digest} has {count} versions" for digest, count in digests.items() if count > 1]
-        references = Counter(str(job.result["reference"]) for job in jobs if job.name == name and job.result)
-        counts = Counter(record.job_id for record in own)
-        for job in jobs:
-            if job.name == name and job.state == "succeeded" and counts[job.id] != 1:
-                found.twice.append(f"{job.id} has {counts[job.id]} versions")
-        found.twice += [f"{reference} is the result of {n} jobs" for reference, n in references.items() if n > 1]
-
-
-def _look_at_events(arena: Arena, job_id: str, found: Settled) -> None:
-    events = arena.service.jobs.events(job_id, limit=100_000)
-    if [event.number for event in events] != list(range(1, len(events) + 1)):
-        found.events.append(f"{job_id}: numbers have gaps")
-    ends = [event.data["state"] for event in events if event.kind == "state" and event.data["state"] == "succeeded"]
-    if len(ends) > 1:
-        found.events.append(f"{job_id}: ended {len(ends)} times")
-
-
-def _is_whole(arena: Arena, artifact: str) -> bool:
-    store = arena.service.storage.store
-    try:
-        folder = store.fetch(artifact)
-    except MissingArtifact:
-        return False
+def _is_as_made(arena: Arena, artifact: str) -> bool:
+    """Whether it has the content that follows from its key."""
+    folder = arena.service.storage.store.fetch(artifact)
     return (folder / DATA).read_bytes() == content(artifact) and (folder / FACTS).is_file()
 
 

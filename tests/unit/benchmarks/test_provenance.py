@@ -12,6 +12,7 @@ import pytest
 from benchmarks import forgetting, provenance, suite, temporal
 from benchmarks.casting import page as raycast
 from benchmarks.casting.check import Effort
+from benchmarks.chaos import page as chaos
 from benchmarks.labelling import page as labelling
 from benchmarks.load import page as load
 from benchmarks.outputs import write_figures
@@ -20,6 +21,7 @@ from benchmarks.render import page as render
 BENCHMARKS = Path(provenance.__file__).parent
 MACHINE = {"processor": "Abacus", "cores": "2", "memory": "1 GiB", "system": "Wood"}
 PAGES: dict[str, tuple[str, Callable[[Any], str]]] = {
+    "CHAOS": ("chaos", chaos.page),
     "FORGETTING": ("forgetting", forgetting.page),
     "LABELLER": ("labeller", labelling.page),
     "LOAD": ("service-load", load.page),

@@ -28,7 +28,8 @@ from services.plan import Plan, plan_of_job
 from services.registry import Registry, open_registry
 from services.retention import DAY, sweep
 from services.settings import Settings
-from services.stages.tasks import METRIC, train_task, trained_on
+from services.stages.inputs import METRIC, trained_on
+from services.stages.tasks import train_task
 from services.storage import Blobs, Storage
 from services.store import Address, Store
 
@@ -251,7 +252,7 @@ def test_the_pipeline_trains_on_old_and_new_and_keeps_both_in_the_provenance(hom
 
 def _registry(home: Home, runner: TableRunner) -> Any:
     """The registry, into which nothing can be published."""
-    home.store.fetch = lambda artifact: Path(artifact)  # type: ignore[method-assign]
+    home.store.fetch = runner.store.fetch  # type: ignore[method-assign]
     table, real = runner.registry, home.registry
     reading = {name: getattr(real, name) for name in ("resolve", "record", "made_from", "champion", "versions")}
     return SimpleNamespace(**reading, folder=table.folder, publish=table.publish, consider=table.consider)

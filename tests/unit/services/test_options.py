@@ -82,6 +82,7 @@ def test_a_steepness_beside_a_bundle_needs_the_tail_that_it_is_of() -> None:
 
 def test_budgets_are_sorted_and_unique(scenes: tuple[Path, ...]) -> None:
     assert BuildOptions(scenes, "glass", budgets=(4.0, 1.0, 4.0)).budgets == (1.0, 4.0)
+    assert BuildOptions(scenes, "glass").budgets is None, "what is captured decides"
 
 
 @pytest.mark.parametrize(

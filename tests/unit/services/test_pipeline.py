@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from support.bundles import make_bundle
 from support.runner import TableRunner, scene
 
 from schemas.job import JobSpec
 from schemas.problem import Problem
-from services import pipeline
 from services.engine.progress import SHARES
 from services.pipeline import JobContext, run_job
 from services.tasks import STAGE_NEEDS, STAGE_ROLE, Task
@@ -157,6 +158,113 @@ def test_one_held_out_scene_of_two_without_a_transparent_view_leaves_the_other_s
     assert "nothing is scored" not in said[0]
 
 
+def test_budgets_that_were_not_given_follow_from_the_held_out_views_and_are_in_the_keys() -> None:
+    runner = TableRunner()
+    runner.totals = {"town view0": 600, "town view1": 100, "bottles view0": 25_000}
+    said: list[str] = []
+    runner.progress.note = said.append  # type: ignore[method-assign]
+    run(runner, spec(budgets=None))
+    assert said == [
+        "Budgets 0.05, 0.125, 0.25, 0.5, 1 (x width x height), because the 2 views to measure hold 0.39 to 2.3 "
+        "transparent fragments a pixel: a budget decides something where it holds up to 75% of a view's fragments. "
+        "--budgets gives others."
+    ]
+    factors = [0.05, 0.125, 0.25, 0.5, 1.0]
+    budgets = [int(factor * 256) for factor in factors]
+    assert all(task.params["budgets"] == budgets for task in (*runner.of("label"), *runner.of("evaluate")))
+    assert all(task.params["factors"] == factors for task in runner.of("evaluate"))
+    assert runner.of("export")[0].params["settings"]["budgets"] == factors
+    assert runner.published[0]["evaluation"]["budgets"] == budgets
+    given = TableRunner()
+    run(given, spec(budgets=factors))
+    assert [task.address for task in given.of("label")] == [task.address for task in runner.of("label")]
+
+
+@pytest.mark.parametrize(
+    ("total", "budgets", "why", "remedy"),
+    [
+        (
+            600,
+            [3.0, 4.0],
+            "Even the smallest budget, 3, holds all fragments, as the 6 captured views have 2.3 a pixel",
+            "Give smaller budgets, --budgets 0.25,0.5,1, or render",
+        ),
+        (10, None, "The budget 0.05 holds all fragments, as the 6 captured views have 0.039 a pixel", "Render these"),
+    ],
+)
+def test_a_build_whose_budgets_hold_everything_ends_before_its_labels(
+    total: int, budgets: list[float] | None, why: str, remedy: str
+) -> None:
+    runner = TableRunner()
+    runner.totals = {f"{record.name} view{view}": total for record in SCENES.values() for view in range(2)}
+    with pytest.raises(Problem) as caught:
+        run(runner, spec(budgets=budgets))
+    assert caught.value.title.startswith(why)
+    assert caught.value.remedy.startswith(remedy)
+    assert runner.stages() == ["scene", "render"]
+    assert not runner.published
+
+
+def test_budgets_that_hold_all_held_out_views_are_said_before_the_training() -> None:
+    runner = TableRunner()
+    runner.totals = {"town view0": 600, "town view1": 100}
+    said: list[str] = []
+
+    def note(text: str) -> None:
+        assert runner.stages() == ["scene", "render"]
+        said.append(text)
+
+    runner.progress.note = note  # type: ignore[method-assign]
+    run(runner, spec(budgets=[3.0]))
+    assert len(said) == 1
+    assert "Nothing will be scored. Give smaller budgets, --budgets 0.05,0.125,0.25,0.5,1, or" in said[0]
+
+
+def test_labels_alone_may_hold_everything() -> None:
+    runner = TableRunner()
+    result = run(runner, spec("label", name=None, budgets=[64.0]))
+    assert len(result["views"]) == 6
+
+
+def test_a_version_has_a_card_with_the_licences_of_what_it_learned_and_what_was_measured() -> None:
+    runner = TableRunner()
+    runner.licences = {"bottles": "CC-BY-NC-4.0; Jane", "town": "CC0"}
+    run(runner, spec())
+    provenance = runner.of("export")[0].params
+    assert provenance["licences"] == {"bottles": "CC-BY-NC-4.0; Jane", "town": "CC0"}
+    (card,) = runner.cards
+    assert (
+        "NOT CLEARED: 1 of 2 training scenes forbid it by their licence (bottles); 1 of 2 training scenes have" in card
+    )
+    assert "| bottles | CC-BY-NC-4.0; Jane | forbidden |" in card
+    assert "| knots | unknown: none is stated | unknown |" in card
+    assert "2 views of 1 scenes that it was not trained on" in card
+    assert "| 1 | 2 | 1.00 | 0.500 | 10.0 |" in card
+    assert "In none of 2 cells" in card
+    assert "diaphane build bottles.usdc knots.usdc town.usdc --name glass --holdout town.usdc --budgets 1" in card
+    given = TableRunner()
+    given.licences = runner.licences
+    uses = [{"scene": key, "holdout": record.name == "town", "licence": "MIT"} for key, record in SCENES.items()]
+    run(given, spec(scenes=uses))
+    assert "Commercial use is allowed by the licences of all 2 training scenes." in given.cards[0]
+    assert [task.address for task in given.of("train")] == [task.address for task in runner.of("train")]
+    assert [t.address for t in given.of("evaluate")] == [t.address for t in runner.of("evaluate")]
+
+
+def test_a_version_that_was_not_measured_says_so_on_its_card() -> None:
+    runner = TableRunner()
+    run(runner, spec("train"))
+    assert "no claim about its error is founded" in runner.cards[0]
+
+
+def test_licences_of_a_data_set_are_those_of_its_scenes() -> None:
+    runner = TableRunner()
+    runner.licences = {"bottles": "CC0"}
+    run(runner, spec("label", name=None))
+    (bottles,) = (record for record in SCENES.values() if record.name == "bottles")
+    assert runner.settings["licences"] == {bottles.digest: "CC0"}
+
+
 def test_what_took_no_part_in_the_labels_is_counted_over_all_views() -> None:
     runner = TableRunner()
     run(runner, spec())
@@ -179,29 +287,28 @@ def test_nothing_transparent_to_train_on_is_a_problem() -> None:
         run(runner, spec())
 
 
-def _champion(trained_on: str, monkeypatch: pytest.MonkeyPatch) -> Any:
-    provenance = SimpleNamespace(scenes={"some": trained_on})
-    monkeypatch.setattr(pipeline, "load_manifest", lambda folder: SimpleNamespace(provenance=provenance))
-    return SimpleNamespace(name="glass", version="1.0.0", digest="c" * 64, files={})
+def _champion(trained_on: str, tmp_path: Path) -> Any:
+    folder = make_bundle(tmp_path / "champion", scenes={"some": trained_on})
+    return SimpleNamespace(name="glass", version="1.0.0", digest="c" * 64, files={}, folder=folder)
 
 
-def test_the_champion_is_measured_on_the_same_views(monkeypatch: pytest.MonkeyPatch) -> None:
-    runner = TableRunner(_champion("9" * 64, monkeypatch))
+def test_the_champion_is_measured_on_the_same_views(tmp_path: Path) -> None:
+    runner = TableRunner(_champion("9" * 64, tmp_path))
     result = run(runner, spec())
     assert len(runner.of("evaluate")) == 6
     assert result["rival_score"] == pytest.approx(1.5)
     assert runner.considered == [(pytest.approx(0.5), pytest.approx(1.5), True)]
 
 
-def test_a_champion_that_was_trained_on_a_held_out_scene_is_not_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_champion_that_was_trained_on_a_held_out_scene_is_not_compared(tmp_path: Path) -> None:
     town = next(record for record in SCENES.values() if record.name == "town")
-    runner = TableRunner(_champion(town.digest, monkeypatch))
+    runner = TableRunner(_champion(town.digest, tmp_path))
     assert run(runner, spec())["rival_score"] is None
     assert runner.considered == [(pytest.approx(0.5), None, True)]
 
 
-def test_fine_tuning_is_another_training_than_one_from_scratch(monkeypatch: pytest.MonkeyPatch) -> None:
-    champion = _champion("9" * 64, monkeypatch)
+def test_fine_tuning_is_another_training_than_one_from_scratch(tmp_path: Path) -> None:
+    champion = _champion("9" * 64, tmp_path)
     scratch, tuned = TableRunner(champion), TableRunner(champion)
     run(scratch, spec())
     run(tuned, spec(start_from="champion", promote="never"))

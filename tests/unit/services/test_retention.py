@@ -20,7 +20,16 @@ from support.bundles import make_bundle
 from schemas.job import FINAL_STATES, JobState
 from services.database import Database, open_database, tables
 from services.registry import open_registry
-from services.retention import ARTIFACT_GRACE, BLOB_GRACE, CACHE_GRACE, DAY, UPLOAD_GRACE, SweepResult, sweep
+from services.retention import (
+    ARTIFACT_GRACE,
+    BLOB_GRACE,
+    CACHE_GRACE,
+    DAY,
+    UPLOAD_GRACE,
+    SweepResult,
+    sweep,
+    sweep_cache,
+)
 from services.settings import Settings
 from services.storage import Blobs, Storage
 from services.store import Address, Store, StoredArtifact
@@ -34,6 +43,8 @@ Machine = Callable[[str], Storage]
 
 class MemoryStore:
     """What retention sees of a store, in memory."""
+
+    checkpoints = Path("no such folder")
 
     def __init__(self, found: list[StoredArtifact]) -> None:
         self.found = {artifact.artifact: artifact for artifact in found}
@@ -402,3 +413,16 @@ def test_local_copies_of_an_object_store_go_and_can_be_fetched_again(tmp_path: P
     assert list(storage.store.cached()) == list(storage.blobs.cached()) == []
     assert (storage.store.fetch(artifact) / "data").stat().st_size == 1000
     assert hashlib.sha256(storage.blobs.path(blob).read_bytes()).hexdigest() == blob
+
+
+def test_checkpoints_of_a_training_that_another_worker_finished_go(machine: Machine, tmp_path: Path) -> None:
+    storage = machine("one")
+    done, open_one = (Address("train", "v1", (name,)) for name in ("a", "b"))
+    with storage.store.put(done) as folder:
+        (folder / "data").write_bytes(b"weights")
+    for address in (done, open_one):
+        (storage.store.checkpoints / address.key).mkdir(parents=True)
+        (storage.store.checkpoints / f"{address.key}.safetensors").touch()  # of a local build
+    sweep_cache(storage, Settings(state=tmp_path), time.time())
+    left = {path.name for path in storage.store.checkpoints.iterdir()}
+    assert left == {open_one.key, f"{open_one.key}.safetensors", f"{done.key}.safetensors"}

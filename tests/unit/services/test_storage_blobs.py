@@ -11,9 +11,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import obstore
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from obstore.exceptions import GenericError
 
 from schemas.problem import ExitCode, Problem
 from services.settings import Settings
@@ -274,8 +276,34 @@ def test_an_object_store_that_is_down_or_has_no_bucket_is_a_problem(
 ) -> None:
     with pytest.raises(Problem, match="bucket of the object store does not exist"):
         open_storage(Settings(state=tmp_path, store="s3://no-such-bucket/x")).blobs.put_bytes(b"data")
-    monkeypatch.setattr("services.storage.remote._RETRY_SECONDS", 0.2)
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
     with pytest.raises(Problem, match="cannot be reached") as caught:
-        open_storage(Settings(state=tmp_path, store=s3_url)).blobs.has("0" * 64)
+        open_storage(Settings(state=tmp_path, store=s3_url), patience=0.2).blobs.has("0" * 64)
     assert caught.value.code == ExitCode.TRY_AGAIN
+
+
+def test_a_request_whose_connection_was_cut_is_sent_again(s3_url: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    remote, cut = Remote.open(s3_url), list[str]()
+
+    def once(name: str) -> None:
+        asked = getattr(obstore, name)
+
+        def ask(*arguments: object, **options: object) -> object:
+            answer = asked(*arguments, **options)
+            if name in cut:
+                return answer
+            cut.append(name)  # what was asked for has been done, and nobody knows
+            raise GenericError("Generic S3 error: HTTP error: error sending request")
+
+        monkeypatch.setattr(f"services.storage.remote.obstore.{name}", ask)
+
+    for name in ("put", "get", "head", "get_range"):
+        once(name)
+    assert remote.create("a", b"content"), "it was this one that made it"
+    assert not remote.create("a", b"another")
+    assert remote.head("a") is not None
+    found = remote.get("a")
+    assert found is not None
+    assert found[0] == b"content"
+    assert b"".join(remote.range("a", 0, 7)) == b"content"
+    assert sorted(cut) == ["get", "get_range", "head", "put"]

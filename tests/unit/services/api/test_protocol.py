@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import socket
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,9 +12,12 @@ from contextlib import contextmanager
 import httpx
 import pytest
 from support.api import Api
+from support.workers import until
 
 from schemas.limits import LIMITS
+from services.api import protocol
 from services.api.protocol import BoundedProtocol
+from services.api.server import server_of
 
 HEAD = b"GET /v1/health/live HTTP/1.1\r\nHost: localhost\r\n"
 
@@ -201,3 +205,45 @@ class _Long:
         from fastapi import Response
 
         return Response(bytes(cls.SIZE))
+
+
+def test_a_server_has_so_many_connections_and_no_more(api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
+    with api.served() as url:
+        monkeypatch.setattr(BoundedProtocol, "most_connections", 2)
+        with _connected(url) as first, _connected(url) as second:
+            for connection in (first, second):
+                connection.sendall(HEAD + b"\r\n")
+                assert connection.recv(1 << 16).startswith(b"HTTP/1.1 200 ")
+            with _connected(url) as third:
+                assert _problem(_rest(third)) == (503, "/v1/problems/unavailable")
+            first.sendall(HEAD + b"\r\n")
+            assert first.recv(1 << 16).startswith(b"HTTP/1.1 200 "), "whoever is connected stays"
+
+
+def test_a_request_on_a_connection_that_was_just_accepted_is_answered_by_a_server_that_stops(
+    api: Api, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(protocol, "ARRIVAL_SECONDS", 20.0)
+    server = server_of(api.app, "127.0.0.1", 0)
+    thread = threading.Thread(target=server.run)
+    thread.start()
+    until(lambda: server.started)
+    url = f"http://127.0.0.1:{server.servers[0].sockets[0].getsockname()[1]}"
+    with _connected(url) as connection:
+        httpx.get(f"{url}/v1/health/live").raise_for_status()  # the connection before it was accepted by now
+        server.should_exit = True
+        until(lambda: not _is_listening(url))
+        connection.sendall(HEAD + b"\r\n")
+        answer = _rest(connection)
+    assert answer.startswith(b"HTTP/1.1 200 ")
+    assert b"connection: close" in answer.lower()
+    thread.join(20.0)
+    assert not thread.is_alive()
+
+
+def _is_listening(url: str) -> bool:
+    try:
+        with _connected(url):
+            return True
+    except ConnectionRefusedError:
+        return False

@@ -112,3 +112,8 @@ def test_two_servers_on_one_database_hold_a_key_to_one_rate(database_url: str, t
     statuses = [api.get("/v1/jobs").status_code for _ in range(60) for api in (one, other)]
     assert 40 <= statuses.count(200) <= 40 + 2 * 40 // SETTLE_PART
     assert statuses[-1] == 429
+    # A quarter of the burst may be guessed at, over both.
+    guess = {"Authorization": f"Bearer dia_{'0' * 12}_{'A' * 43}"}
+    statuses = [api.get("/v1/jobs", None, headers=guess).status_code for _ in range(20) for api in (one, other)]
+    assert 10 <= statuses.count(401) <= 10 + 2 * (10 // SETTLE_PART + 1)
+    assert statuses[-1] == 429

@@ -279,8 +279,9 @@ def test_a_promotion_needs_the_scope_for_it(
         assert answer.json()["spec"]["promote"] == promote
 
 
-def test_a_view_without_direction_is_refused_at_once(api: Api) -> None:
-    view = {"eye": [0, 0, 1], "target": [0, 0, 1], "up": [0, 1, 0], "fov": 40}
+@pytest.mark.parametrize("eye", [[0, 0, 1], [1e308, 1e185, 0]])
+def test_a_view_without_direction_is_refused_at_once(api: Api, eye: list[float]) -> None:
+    view = {"eye": eye, "target": [0, 0, 1], "up": [0, 1, 0], "fov": 40}
     answer = api.post("/v1/jobs", json=_job(scenes=[{"scene": "scn_" + "0" * 32, "views": [view]}]))
     assert answer.status_code == 422
     assert "no direction" in answer.text

@@ -11,7 +11,10 @@ from xml.etree import ElementTree
 import pytest
 from support.bench import cell, view
 
+from benchmarks.comparing.work import work as work_table
 from schemas.bench import BenchResult, Times
+from schemas.work import Device, PassWork
+from services.bench.account import COLUMNS
 from services.bench.bars import error_bars
 from services.bench.groups import group, groups_of, offline
 from services.bench.page import charts_of, page
@@ -52,6 +55,25 @@ def test_a_row_that_fits_nowhere_has_the_most_bytes_of_all_its_views() -> None:
     among = group("", [view(cell("abuffer-array")), view(large, key="b")]).rows[0]
     assert (among.problem, among.views, among.pool_bytes, among.fits) == (None, 1, 9000, False)
     assert group("", VIEWS).rows[0].fits
+
+
+def test_an_account_is_over_the_views_that_were_counted() -> None:
+    work = {"sums": PassWork(geometry_passes=1, fragments=400, blended_bytes=16_000), "resolve": PassWork(pixels=100)}
+    views = [view(cell("moment", work=work), key=key) for key in "ab"] + [view(cell("moment"), key="c")]
+    account = group("", views).rows[0].account
+    assert account is not None
+    assert (account.views, account.pixels, account.fragments) == (2, 200, 800)
+    assert account.total == PassWork(geometry_passes=2, fragments=800, pixels=200, blended_bytes=32_000)
+    assert account.a_pixel(account.total.blended_bytes) == 160.0
+    assert account.a_fragment(account.total.blended_bytes) == 40.0
+    device = Device(bandwidth=1.0, fill_rate=0.01)
+    assert account.bound(device) == pytest.approx(0.04 + 0.01)
+    assert account.bound(device, "resolve") == pytest.approx(0.01)
+    assert account.columns(device)[:4] == ["1.00", "5.00", "160", "160"]
+    assert len(account.columns(device)) == len(COLUMNS)
+    assert group("", VIEWS).rows[0].account is None
+    assert "| moment | 1.00 | 5.00 | 160 | 160 |" in work_table(views, 2.0, device)
+    assert work_table(VIEWS, 2.0, device) == ""
 
 
 def test_a_group_is_as_deep_as_its_views_are_on_average() -> None:

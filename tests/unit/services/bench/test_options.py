@@ -10,7 +10,8 @@ import pytest
 
 from renderer.techniques import Needs
 from schemas.problem import ExitCode, Problem
-from services.bench.options import BenchOptions, parse_alphas, parse_budgets, parse_sizes, parse_tails
+from schemas.work import Device
+from services.bench.options import BenchOptions, parse_alphas, parse_budgets, parse_device, parse_sizes, parse_tails
 
 
 @pytest.fixture
@@ -66,6 +67,13 @@ def test_scenes_of_one_name_cannot_be_told_apart(options: BenchOptions, tmp_path
     (tmp_path / "other" / "scene.usdc").touch()
     with pytest.raises(Problem, match="2 scenes are called scene"):
         replace(options, scenes=(*options.scenes, tmp_path / "other" / "scene.usdc"))
+
+
+@pytest.mark.parametrize("given", [(0.0, 1.0), (1.0, float("nan")), (float("inf"), 1.0)])
+def test_bounds_are_stated_for_a_device_that_can_be(given: tuple[float, float]) -> None:
+    assert parse_device(250.0, 2.5) == Device(bandwidth=250.0, fill_rate=2.5)
+    with pytest.raises(Problem, match="cannot be used"):
+        parse_device(*given)
 
 
 def test_lists_are_read_in_order_and_once() -> None:

@@ -115,6 +115,20 @@ def test_a_process_that_met_a_scene_meets_no_other_one(child: Child, store: Stor
     assert len(set(pids)) == 3
 
 
+def test_what_was_compiled_for_one_key_is_loaded_for_no_other(child: Child, store: Store, tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.mkdir()
+    planted = tmp_path / "kernels" / "key_a" / "kernel.nbc"
+    planted.parent.mkdir(parents=True)
+    planted.write_text("code")
+    seen, pids = {}, set()
+    for owner in ("key_a", "key_b", ""):
+        seen[owner] = _seen(child, Assignment(sources={"s": source}, owner=owner), planted)[str(planted)]
+        pids.add(child.pid)
+    assert seen == {"key_a": "code", "key_b": "PermissionError", "": "PermissionError"}
+    assert len(pids) == 3, "what one key's process has loaded goes with it"
+
+
 def test_a_store_that_comes_back_as_another_folder_is_used_by_the_same_process(
     child: Child, store: Store, tmp_path: Path
 ) -> None:

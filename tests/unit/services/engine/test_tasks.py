@@ -67,6 +67,21 @@ def bench(fleet: Fleet) -> Bench:
     return Bench(fleet)
 
 
+def test_a_task_whose_process_was_killed_is_the_next_one_again(bench: Bench) -> None:
+    bench.place("a", "b", "c")
+    claim, place = bench.begin(0)
+    bench.tasks.fail(claim, place, Problem("It crashed.", "Repeat it."), 0, final=False, crashed=True)
+    bench.set(claim.workflow_id, status="SUCCESS")
+    table = system.workflows(bench.database)
+    waiting = sa.select(table.c.workflow_uuid).where(table.c.status == "ENQUEUED", table.c.queue_name == "render")
+    with bench.database.read() as connection:
+        found = list(connection.scalars(waiting.order_by(table.c.priority)))
+    assert found == [bench.workflow(0, 1), bench.workflow(1), bench.workflow(2)]
+    claim, place = bench.begin(0, 1)
+    bench.tasks.fail(claim, place, Problem("It crashed.", "Repeat it."), 1, final=False, crashed=True)
+    assert bench.workflows()["0/2"] == "DELAYED"
+
+
 def test_placing_again_queues_nothing_twice(bench: Bench) -> None:
     bench.place("a", "b")
     bench.place("c", held=True)

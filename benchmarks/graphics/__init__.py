@@ -1,0 +1,1 @@
+"""What a graphics card is measured by (`make bench-gpu`): which parts, how, and whether its pictures are right."""
