@@ -132,7 +132,7 @@ class Cluster:
         self._environment |= {f"DIAPHANE_{name}": value for name, value in given.items()}
         self._environment |= {"PYTHONPATH": str(ROOT), **environment}
         own = {name.lower(): value for name, value in given.items()}
-        self.service = open_service(Settings(state=folder / "client", **own))  # type: ignore[arg-type]
+        self.service = open_service(Settings(state=folder / "client", **own))
         record, self.key = self.service.keys.create(KEY_NAME, ["admin"])
         self.key_id = record.id
         self.members: list[Member] = []

@@ -21,7 +21,8 @@ def warm(folders: Iterable[Path]) -> None:
     for folder in folders:
         for package in PACKAGES:
             for cache in (ROOT / package).rglob("__pycache__"):
-                own = folder / UserProvidedCacheLocator.get_suitable_cache_subpath(str(cache.parent / "__init__.py"))
+                source = str(cache.parent / "__init__.py")
+                own = folder / UserProvidedCacheLocator.get_suitable_cache_subpath(source)  # type: ignore[no-untyped-call]
                 for found in cache.glob("*.nb[ic]"):
                     own.mkdir(parents=True, exist_ok=True)
                     shutil.copy2(found, own / found.name)
