@@ -70,7 +70,7 @@ class Address:
 
     Attributes:
         stage: Name of the stage, a folder name.
-        version: Code version of the stage (`services.versions.code_version`).
+        version: Of the code of the stage (`services.closure.Tree.version`).
         inputs: Keys or digests of what the stage reads, in a fixed order.
         params: JSON values that change the result. Paths do not belong here, digests of their content do.
     """

@@ -42,7 +42,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         wanted = set(getattr(item, "fixturenames", ()))
         given = getattr(item, "callspec", None)
-        if wanted & {"chromium", "postgres"} or (given is not None and "postgresql" in given.params.values()):
+        if wanted & {"chromium", "postgres"} or (
+            given is not None and any(isinstance(one, str) and one == "postgresql" for one in given.params.values())
+        ):
             item.add_marker(pytest.mark.installed)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from schemas.job import JobKind
 from tests.support.cluster import Cluster
+from tests.support.solids import SPHERE_AND_CUBE
 
 BUILDS_OF_FAMILY = 2
 """At least: builds of the same scenes share what is rendered and labelled, and wait for each other's tasks."""
@@ -15,31 +16,6 @@ MOST_FAMILIES = 10
 SIZE = 64, 48
 STEPS = 20
 _CHECK_SECONDS = 900.0
-_SCENE = """#usda 1.0
-(
-    defaultPrim = "World"
-    metersPerUnit = 1
-    upAxis = "Y"
-)
-def Xform "World"
-{{
-    def Sphere "outer"
-    {{
-        double radius = {radius}
-        color3f[] primvars:displayColor = [(0.9, 0.4, 0.2)]
-    }}
-    def Cube "inner"
-    {{
-        double size = 1
-        color3f[] primvars:displayColor = [(0.1, 0.5, 0.9)]
-    }}
-    def Camera "front"
-    {{
-        double3 xformOp:translate = (0, 0.5, 6)
-        uniform token[] xformOpOrder = ["xformOp:translate"]
-    }}
-}}
-"""
 
 
 def upload(cluster: Cluster, families: int, scenes: int = 2) -> list[list[str]]:
@@ -92,5 +68,5 @@ def spec(families: Sequence[Sequence[str]], number: int, kind: JobKind) -> dict[
 
 def _scene(cluster: Cluster, radius: float) -> str:
     service, name = cluster.service, f"sphere-{radius:.2f}.usda"
-    sha256 = service.storage.blobs.put_bytes(_SCENE.format(radius=f"{radius:.2f}").encode()).sha256
+    sha256 = service.storage.blobs.put_bytes(SPHERE_AND_CUBE.format(radius=f"{radius:.2f}").encode()).sha256
     return service.scenes.create(name, name, {name: sha256}, cluster.key_id)[0].id

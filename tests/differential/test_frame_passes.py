@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import moderngl
 import numpy as np
@@ -17,7 +18,10 @@ from renderer.culling import Ranges
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.hidden import hidden_fragments
+from renderer.samples import SAMPLES
+from renderer.scene import load_scene
 from renderer.techniques import Budget, SBuffer
+from renderer.views import scene_views
 from schemas.fragments import FragmentDump
 from schemas.problem import Problem
 from schemas.scene import Batch
@@ -161,6 +165,18 @@ def test_ranges_of_pixels_and_what_the_density_tail_reads_equal_those_of_the_dum
     expected = np.stack([np.bincount(pixel, weights, dump.pixels) for weights in sums], axis=1)
     texels = np.frombuffer(frame.gather_density().read(), dtype=np.float32).reshape(-1, 4)
     np.testing.assert_allclose(texels, expected, rtol=2e-5, atol=2e-5)
+
+
+def test_ranges_of_tiles_are_in_front_of_an_eye_that_is_inside_of_a_scene(
+    ctx: moderngl.Context, tmp_path: Path
+) -> None:
+    scene = load_scene(SAMPLES["voxel_town"](tmp_path))
+    inside = scene_views(scene, 2, 0)[1]
+    found = capture(Frame(GpuScene(ctx, scene), inside, 715, 480)).dump.tile_range
+    assert found is not None
+    nearest, farthest = found.T
+    assert (nearest >= 0.0).all()
+    assert (farthest >= nearest).all()
 
 
 def test_facing_is_that_of_the_nearest_fragment(frame: Frame, dump: FragmentDump) -> None:

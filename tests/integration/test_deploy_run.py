@@ -17,6 +17,7 @@ from support.deploy import own_services
 from support.postgres import Postgres
 from support.processes import Service
 from support.s3 import S3Server
+from support.solids import SPHERE_AND_CUBE
 
 from services.tasks import STAGE_ROLE
 
@@ -28,31 +29,6 @@ VARIABLES = {
     "OBJECTS_SECRET_KEY": "test",
     "DIAPHANE_SIGNING_KEY": "AAECAwQFBgcICQoLDA0ODxAREhMUFRYXGBkaGxwdHh8=",
 }
-SCENE = """#usda 1.0
-(
-    defaultPrim = "World"
-    metersPerUnit = 1
-    upAxis = "Y"
-)
-def Xform "World"
-{{
-    def Sphere "outer"
-    {{
-        double radius = {radius}
-        color3f[] primvars:displayColor = [(0.9, 0.4, 0.2)]
-    }}
-    def Cube "inner"
-    {{
-        double size = 1
-        color3f[] primvars:displayColor = [(0.1, 0.5, 0.9)]
-    }}
-    def Camera "front"
-    {{
-        double3 xformOp:translate = (0, 0.5, 6)
-        uniform token[] xformOpOrder = ["xformOp:translate"]
-    }}
-}}
-"""
 
 
 @dataclass
@@ -121,7 +97,7 @@ def test_together_they_build_from_upload_to_published_version(running: Running, 
         service.wait_until_healthy(90.0)
     scenes = []
     for name, radius in (("near.usda", 1.0), ("far.usda", 1.5)):
-        (tmp_path / name).write_text(SCENE.format(radius=radius), encoding="utf-8")
+        (tmp_path / name).write_text(SPHERE_AND_CUBE.format(radius=radius), encoding="utf-8")
         scenes.append(str(tmp_path / name))
     options = ["--name", "tiny", "--size", "64x48", "--budgets", "1", "--alpha", "0.5", "--steps", "20"]
     options += ["--views-per-scene", "1", "--weights", "flip"]  # which needs FLIP where labels are made

@@ -12,6 +12,8 @@ void main() {
 #endif
     // Across a silhouette the slope says nothing: no surface falls by a twentieth of its distance within a tile.
     float reach = min(0.5 * (abs(dFdx(v_depth)) + abs(dFdy(v_depth))), 0.05 * v_depth);
+    // Where a triangle that reaches behind the eye is interpolated beyond its edges; such bits would be the greatest.
+    if (!(v_depth > 0.0)) return;
     int tile = int(gl_FragCoord.y) / STEPS * width + int(gl_FragCoord.x) / STEPS;
     atomicMin(tile_range[2 * tile], floatBitsToUint(v_depth - reach));
     atomicMax(tile_range[2 * tile + 1], floatBitsToUint(v_depth + reach));

@@ -136,7 +136,7 @@ class Arena(Cluster):
         """A build of two scenes, one of them held out."""
         first, second = self._scenes
         scenes = [{"scene": first}, {"scene": second, "holdout": True}]
-        size = {"width": 32, "height": 32, "budgets": [2.0], "views_per_scene": views}
+        size = {"width": 32, "height": 32, "budgets": [0.25], "views_per_scene": views}
         return {"kind": "build", "name": name, "scenes": scenes, "seed": seed, **size, **more}
 
     def submit(self, name: str, seed: int, views: int = 1, **more: Any) -> str:
