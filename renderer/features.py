@@ -220,8 +220,8 @@ def _gather(
         row[2], row[3] = nearest[p], nearest[p] + extent[p]
         for c in range(3):
             row[_BACKGROUND + c] = background[p, c] / 255.0
-        row[_LUMA] = min(light, _MOST) * np.float32((1 << LUMA_SHIFT) / 255.0) / np.float32(OPTICAL_UNIT)
-        row[_LUMA + 1] = min(square, _MOST) * np.float32((1 << LUMA_SQUARE_SHIFT) / 65025.0) / np.float32(OPTICAL_UNIT)
+        row[_LUMA] = min(light, _MOST) * ((1 << LUMA_SHIFT) / 255.0 / OPTICAL_UNIT)
+        row[_LUMA + 1] = min(square, _MOST) * ((1 << LUMA_SQUARE_SHIFT) / 65025.0 / OPTICAL_UNIT)
         for b in range(1, bins):
             row[_FRONT - 1 + b] = kept.front[b]
             if mean_levels:

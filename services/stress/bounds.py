@@ -117,11 +117,11 @@ BOUNDS: Final[dict[str, Bound]] = {
         1e-12, "relative", 1.0, "The same with `t = -log lambda`; relative to the largest `|a| + n b` of the view."
     ),
     "fill.cuts": Bound(
-        2.5e-4,
-        "relative",
+        1.01,
+        "absolute",
         1.0,
-        "The same for whole bins, in float32 as the compute passes have it: a price is known by 22 bits, so that "
-        "prices up to 2^-13 |t| apart have the same rank, and what comes at the last one is handed out by pixel index.",
+        "The same for whole bins, in ranks of prices, rounded as compute passes have them: what comes at one rank is "
+        "handed out by pixel index. The hundredth is for prices in float32.",
     ),
     "fill.order": Bound(
         0.0,

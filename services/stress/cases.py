@@ -142,7 +142,7 @@ def bin_cases() -> list[Case]:
     full = [np.where(np.arange(64) < ahead, 1.0, 2.0) for ahead in (0, 13, 32, 51, 64)]
     return [
         Case("depths at the edges of bins, n 85", dump_of([_equal(edges, level) for level in (1, 128, 254)])),
-        Case("shares halfway between two steps, n 30", dump_of([_equal(depth, 128) for depth in ties])),
+        Case("shares halfway between two steps, n 30", dump_of([_equal(depth, 64) for depth in ties])),
         Case("more than a bin holds, n 64", dump_of([_equal(depth, 254) for depth in full])),
     ]
 

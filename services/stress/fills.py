@@ -126,9 +126,7 @@ def _order_of_gains(name: str, n: Counts, a: Numbers, b: Numbers, found: list[tu
         lowest = (gain - (k - 1.5) * decay)[given].min(initial=math.inf)
         highest = (gain - (k - 0.5) * decay)[missing].max(initial=-math.inf)
         scale = float((np.abs(gain) + n * decay).max())
-        alike = 2.0 ** (DROPPED_BITS - 22) * max(lowest - LEAST_PRICE, 1.0) if math.isfinite(lowest) else 0.0
-        beyond = LEAST_PRICE + 2.0 ** (RANKS >> 23 - DROPPED_BITS)  # the last rank has no end
-        late.append(max((min(highest, beyond) - lowest - alike) / scale, 0.0))
+        late.append(max((highest - lowest) / scale, 0.0))
         places.append(f"F {budget}")
     return within("fill.lambda", name, np.array(late), np.zeros(len(late)), places)
 
@@ -183,20 +181,23 @@ def _cut_limits(name: str, n: NDArray[np.int64], events: Events, found: list[tup
 
 
 def _order_of_bins(name: str, n: NDArray[np.int64], a: Numbers, b: Numbers, found: list[tuple[int, Cuts]]) -> Finding:
-    """A bin comes at the price where the middle of its fragments does, as far as prices are told from each other."""
+    """A bin comes at the rank of the price where the middle of its fragments does: by how many ranks it is late."""
     gain, fall, after = a.astype(np.float64)[:, None], b.astype(np.float64)[:, None], np.cumsum(n, axis=1)
-    price = fall * (after - n / 2.0 - 1.0) - gain
-    scale = float((np.abs(gain) + after * fall).max())
+    rank = exact_rank(fall * (after - n / 2.0 - 1.0) - gain)
     late, places = [], []
     for budget, cuts in found:
         inside = np.arange(n.shape[1]) < cuts.cut[:, None]
-        highest = price[inside & (n > 0)].max(initial=-math.inf)
-        lowest = price[~inside & (n > 0)].min(initial=math.inf)
-        alike = 2.0 ** (DROPPED_BITS - 22) * max(lowest - LEAST_PRICE, 1.0) if math.isfinite(lowest) else 0.0
-        beyond = LEAST_PRICE + 2.0 ** (RANKS >> 23 - DROPPED_BITS)  # the last rank has no end
-        late.append(max((min(highest, beyond) - lowest - alike) / scale, 0.0))
+        highest = rank[inside & (n > 0)].max(initial=-math.inf)
+        late.append(max(highest - rank[~inside & (n > 0)].min(initial=math.inf), 0.0))
         places.append(f"F {budget}")
     return within("fill.cuts", name, np.array(late), np.zeros(len(late)), places)
+
+
+def exact_rank(price: NDArray[np.float64]) -> NDArray[np.float64]:
+    """`renderer.allocation.cuts.rank_of` before it is rounded down: linear between the powers of two."""
+    fraction, exponent = np.frexp(np.maximum(price - LEAST_PRICE, 1.0))
+    per_octave = 2.0 ** (23 - DROPPED_BITS)
+    return np.minimum((exponent - 1 + 2.0 * fraction - 1.0) * per_octave, RANKS - 1.0)
 
 
 def _sums(rng: np.random.Generator, count: int) -> Iterator[Finding]:

@@ -13,9 +13,9 @@ from labeller import reference
 from renderer import programs
 from renderer.programs import Programs
 from renderer.reference import moment
-from renderer.techniques import TECHNIQUES, Budget, KBufferDeep, KBufferDynamic, KBufferOptimal, Needs
+from renderer.techniques import TECHNIQUES, Budget, KBufferDynamic, KBufferOptimal, Needs
 from renderer.techniques.ordered import Ordered, capture_ordered
-from schemas.tail import DEFAULT_TAIL, TAILS, TailKind
+from schemas.tail import TAILS, TailKind
 from services.stress import (
     gl,
     gl_allocation,
@@ -198,22 +198,6 @@ def test_a_broken_allocation_is_a_violation(
 ) -> None:
     replaced(monkeypatch, file, old, new)
     assert not all(row.ok for row in gl_allocation.rows(gl, QUICK, "here"))
-
-
-def test_curves_that_stay_nan_are_a_violation(
-    gl: moderngl.Context, made: gl_network.Networks, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    case = make_case(gl, CASES["alpha 0 and 1"], Programs(gl))
-    deep, needs = KBufferDeep, Needs(bundle=made.overflowing)
-    answers = deep(made.overflowing).predict(case.frame, np.flatnonzero(case.dump.counts).astype(np.uint32))
-    assert np.isnan(answers).any()
-    form = gl_techniques.Form("overflowing", (DEFAULT_TAIL,))
-    truth = Truth.of(case)
-    assert all(row.ok for row in gl_techniques.bounded_rows(case, truth, deep.name, needs, "here", form))
-    replaced(monkeypatch, "kbuffer-deep/curves.comp", "is_nan ? for_nan", "is_nan ? x")
-    case = make_case(gl, CASES["alpha 0 and 1"], Programs(gl))
-    rows = gl_techniques.bounded_rows(case, truth, deep.name, needs, "here", form)
-    assert [row.path for row in rows if not row.ok] == ["overflowing.F and K · here"]
 
 
 def test_a_picture_that_is_not_finite_is_a_violation(gl: moderngl.Context, monkeypatch: pytest.MonkeyPatch) -> None:
