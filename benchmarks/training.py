@@ -61,7 +61,7 @@ def stopping(views: Sequence[ViewData], judges: Sequence[ViewData]) -> list[Row]
         "3000 steps, patience 3": {"steps": 3000, "validate_every": 250, "patience": 3},
         "1500 steps, patience 3": {"validate_every": 250, "patience": 3},
     }.items():
-        result = train(views, (), TrainConfig.of("gain-curve", **changes))
+        result = train(views, (), TrainConfig.of("bin-gains", **changes))
         row = _scored(title, evaluate(result.weights, judges))
         rows.append({**row, "last step": result.history[-1].step, "kept out": ", ".join(result.kept_out)})
     return rows

@@ -78,6 +78,14 @@ def columns(count_type: CountType = "uint16") -> tuple[Column, ...]:
             fields={name: FEATURE_MEANINGS[name] for name in FEATURES},
         ),
         Column(name="n", per="row", dtype=count_type, unit="fragments", meaning="fragments of the pixel"),
+        Column(
+            name="bin_counts",
+            per="row",
+            dtype="uint8",
+            unit="fragments",
+            meaning="fragments in each depth bin, 255 for that many or more",
+            fields={f"bin_{b}": f"depth bin {b}; 0 where the tail has no such bin" for b in range(MOST_BINS)},
+        ),
         Column(name="pixel", per="row", dtype="uint32", unit="1", meaning="y * width + x, row 0 at the top, ascending"),
         Column(
             name="hull_segments",

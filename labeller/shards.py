@@ -31,6 +31,7 @@ from labeller.rules import allocate_curves
 from labeller.sampling import Sampling, SamplingKind, sample_pixels
 from labeller.shard_file import Columns, Damage, OtherSchema, ShardFile, Written, open_columns, write_columns
 from labeller.skips import needed_budgets
+from renderer.depth_bins import bin_counts
 from renderer.features import derive, gather
 from schemas.fragments import FragmentDump
 from schemas.pixel_weights import DEFAULT_WEIGHTS, PixelWeights, without_default
@@ -107,8 +108,9 @@ class Shard:
     """Sampled pixels of one view.
 
     Attributes:
-        features: float32 [R, 41], columns `renderer.features.FEATURES`.
+        features: float32 [R, C], columns `renderer.features.FEATURES`.
         n: int32 [R], fragments.
+        bin_counts: uint8 [R, MOST_BINS], fragments of each depth bin, `COUNT_LIMIT` for that many or more.
         pixel: int32 [R], pixel index in the view, ascending.
         hull_offsets: int64 [R+1], hull vertices of row r are `hull_offsets[r]:hull_offsets[r+1]`.
         hull_k: int32 [M], from 0, ascending.
@@ -118,6 +120,7 @@ class Shard:
 
     features: NDArray[np.float32]
     n: NDArray[np.int32]
+    bin_counts: NDArray[np.uint8]
     pixel: NDArray[np.int32]
     hull_offsets: NDArray[np.int64]
     hull_k: NDArray[np.int32]
@@ -285,6 +288,7 @@ def _check_values(shard: Shard) -> None:
         and shard.pixel.max(initial=0) < meta.width * meta.height,
         "counts that the view does not have": shard.n.min(initial=1) > 0
         and int(shard.n.sum(dtype=np.int64)) <= meta.fragments,
+        "more fragments in bins than in their pixel": (shard.bin_counts.sum(axis=1, dtype=np.int64) <= shard.n).all(),
         "hulls that are not in 0..n": (np.diff(shard.hull_k)[inner] > 0).all()
         and (shard.hull_k[last] <= shard.n[has_hull]).all(),
         "errors that do not fall to 0": np.isfinite(shard.hull_error).all()
@@ -307,6 +311,7 @@ def _columns(dump: FragmentDump, tail: TailName, hulls: Hulls, pixel: NDArray[np
     return {
         "features": derive(gather(dump, tail)[pixel]),
         "n": n.astype(count),
+        "bin_counts": bin_counts(dump, tail)[pixel],
         "pixel": pixel.astype(np.uint32),
         "hull_segments": segments.astype(count),
         "hull_length": (hulls.k[start + 1] - hulls.k[start]).astype(count),
@@ -330,6 +335,7 @@ def _shard(columns: Columns, meta: ShardMeta) -> Shard:
     return Shard(
         features=columns["features"].astype(np.float32, copy=False),
         n=columns["n"].astype(np.int32),
+        bin_counts=columns["bin_counts"].astype(np.uint8, copy=False),
         pixel=columns["pixel"].astype(np.int32),
         hull_offsets=offsets,
         hull_k=k.astype(np.int32),

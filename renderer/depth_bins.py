@@ -12,18 +12,23 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, prange
 from numpy.typing import NDArray
 
+from renderer.tile_range import pixel_ranges
+from schemas.fragments import FragmentDump
 from schemas.tail import (
     BIN_LIMIT,
+    COUNT_LIMIT,
     LEAST_OTHERS,
     LEAST_SPREAD,
     MOST_BINS,
     OPTICAL_UNIT,
     PLAIN_SHARE,
     ROOT_SHARE,
+    TAILS,
     Tail,
+    TailName,
 )
 
 OPTICAL: Final = -np.log(np.maximum(1.0 - np.arange(256) / 255.0, 1e-3))
@@ -189,3 +194,34 @@ def binned_exponents(
         place = place_of(depth[np.uint64(i)], nearest, extent, form.bins)
         b = min(int(place), form.bins - 1)
         out[np.uint64(i)] = in_front_of(optical, OPTICAL[rgba[np.uint64(i), 3]], place, b, kept)
+
+
+def bin_counts(dump: FragmentDump, name: TailName) -> NDArray[np.uint8]:
+    """Fragments of each depth bin of every pixel, as a frame counts them.
+
+    Args:
+        dump: Fragments of a view.
+        name: A tail with bins.
+
+    Returns:
+        uint8 [P, MOST_BINS], `COUNT_LIMIT` for that many or more, 0 where the tail has no such bin.
+    """
+    counts, ranges = np.zeros((dump.pixels, MOST_BINS), dtype=np.uint8), pixel_ranges(dump)
+    _count_bins(TAILS[name].bins, dump.offsets, dump.depth, ranges.nearest, ranges.extent, counts)
+    return counts
+
+
+@njit(parallel=True, cache=True)
+def _count_bins(
+    bins: int,
+    offsets: NDArray[np.int64],
+    depth: NDArray[np.float32],
+    nearest: NDArray[np.float32],
+    extent: NDArray[np.float32],
+    counts: NDArray[np.uint8],
+) -> None:
+    for p in prange(len(offsets) - 1):
+        for i in range(offsets[p], offsets[p + 1]):
+            b = min(int(place_of(depth[i], nearest[p], extent[p], bins)), bins - 1)
+            if counts[p, b] < COUNT_LIMIT:
+                counts[p, b] += 1

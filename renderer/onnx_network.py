@@ -32,12 +32,13 @@ class OnnxNetwork:
             model.read_bytes(), options, providers=["CPUExecutionProvider"]
         )
 
-        self._outputs = [output.name for output in self._session.get_outputs()]
+        (answers,) = self._session.get_outputs()
+        self._output, self._columns = answers.name, int(answers.shape[1])
 
     def run(self, features: NDArray[np.float32]) -> NDArray[np.float32]:
         """float32 [M, outputs], what the network answers to every row of float32 [M, features]."""
-        answers = np.empty((len(features), len(self._outputs)), dtype=np.float32)
+        answers = np.empty((len(features), self._columns), dtype=np.float32)
         for first in range(0, len(features), ROWS):
             part = slice(first, first + ROWS)
-            answers[part] = np.stack(self._session.run(self._outputs, {"features": features[part]}), axis=1)
+            answers[part] = self._session.run([self._output], {"features": features[part]})[0]
         return answers

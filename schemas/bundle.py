@@ -1,7 +1,7 @@
 """The manifest of a bundle: what its predictor reads, which tail it was trained for, and what was proven of it.
 
-A bundle is a folder with `manifest.json` and the files that it lists by hash. The predictor gives `a` and `b` per
-pixel; the renderer keeps `k = clamp(floor(1.5 + (a - log lambda) / b), 0, n)` fragments (METHOD.md section 4).
+A bundle is a folder with `manifest.json` and the files that it lists by hash. The predictor says of each depth bin of a
+pixel from which price per fragment on it is in the core (METHOD.md section 4).
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ import math
 from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError, field_validator, model_validator
 
 from schemas.problem import ExitCode, Problem
-from schemas.tail import BINNED_TAILS, MetricName, TailName
+from schemas.tail import BINNED_TAILS, MOST_BINS, TAILS, MetricName, TailName
 
 FormatName = Literal["diaphane-bundle/2"]
 FORMAT: Final = "diaphane-bundle/2"
@@ -45,40 +45,33 @@ SHADERS: Final = (GLSL, UBO, WGSL, HLSL, GLSL_HALF, UBO_HALF, WGSL_HALF)
 FILES: Final = (WEIGHTS, ONNX, GLSL, UBO, UBO_DATA, WGSL, HLSL, *HALF_FILES)
 """What a bundle holds beside its manifest and its card."""
 
-GAIN_FLOOR: Final = 0.02
-"""`b = softplus(.) + GAIN_FLOOR`: log gain lost per fragment is at least this, so that 1 / b stays finite."""
+HeadName = Literal["bin-gains", "importance"]
+OutputName = str
 
-G_MAX: Final = 2.0
-"""`g = G_MAX sigmoid(.)`: the steepest density tail that a network may ask for."""
 
-HeadName = Literal["gain-curve", "importance"]
-OutputName = Literal["a", "b", "g", "importance"]
+def gain_outputs(bins: int) -> tuple[OutputName, ...]:
+    """What a network of the head `bin-gains` answers for a tail of so many bins."""
+    return (*(f"gain_{b}" for b in range(bins)), "prior")
+
 
 HEADS: Final[dict[HeadName, tuple[tuple[OutputName, ...], ...]]] = {
-    "gain-curve": (("a", "b"), ("a", "b", "g")),
+    "bin-gains": tuple(gain_outputs(bins) for bins in sorted({TAILS[name].bins for name in BINNED_TAILS})),
     "importance": (("importance",),),
 }
 """What a network of each head may answer.
 
-`a`, `b`: the log gain of core fragment k is `a - b (k - 1)`. `g`: the density tail's constant of the pixel.
-`importance`: DHOIT's share of a pixel, which Eq. 3 turns into k.
+`gain_b`: by how much the log gain of each fragment of depth bin b is above `prior` times what the tail tells of it
+(`renderer.allocation.prices`). `importance`: DHOIT's share of a pixel, which Eq. 3 turns into k.
 """
 
 
-class Activation(NamedTuple):
-    """What makes an output of the last layer's number: `scale * function(x) + offset`."""
-
-    function: Literal["identity", "softplus", "sigmoid"]
-    scale: float
-    offset: float
-
-
-ACTIVATIONS: Final[dict[OutputName, Activation]] = {
-    "a": Activation("identity", 1.0, 0.0),
-    "b": Activation("softplus", 1.0, GAIN_FLOOR),
-    "g": Activation("sigmoid", G_MAX, 0.0),
-    "importance": Activation("sigmoid", 1.0, 0.0),
+ActivationName = Literal["identity", "softplus", "sigmoid"]
+ACTIVATIONS: Final[dict[OutputName, ActivationName]] = {
+    **dict.fromkeys(gain_outputs(MOST_BINS), "identity"),
+    "prior": "softplus",
+    "importance": "sigmoid",
 }
+"""What makes an output of the last layer's number."""
 
 FEATURE_LIMIT: Final = 4.0
 """Normalised features are clamped to this, either way: beyond it no training data says what a network would answer."""
@@ -248,7 +241,7 @@ class Manifest(BaseModel):
         format: Version of this schema.
         name: Name of the bundle.
         head: How the outputs are read.
-        outputs: What the network answers, in this order; one of `HEADS[head]`.
+        outputs: What the network answers, in this order; the one of `HEADS[head]` that the tail's bins ask for.
         features: Inputs of the network, in order.
         hidden: Units of each hidden layer (ReLU).
         layers: Tensors of `weights.safetensors`.
@@ -266,7 +259,7 @@ class Manifest(BaseModel):
 
     format: FormatName = FORMAT
     name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
-    head: HeadName = "gain-curve"
+    head: HeadName = "bin-gains"
     outputs: tuple[OutputName, ...]
     features: tuple[FeatureSpec, ...] = Field(min_length=1, max_length=256)
     hidden: tuple[int, ...] = Field(max_length=8)
@@ -298,7 +291,8 @@ class Manifest(BaseModel):
         names = self.feature_names
         if len(set(names)) != len(names):
             raise ValueError("a feature is listed twice")
-        if self.outputs not in HEADS[self.head]:
+        answered = gain_outputs(TAILS[self.tail.name].bins) if self.head == "bin-gains" else ("importance",)
+        if self.outputs != answered:
             raise ValueError(f"a network of the head {self.head} does not answer {', '.join(self.outputs)}")
         if self.layers != layer_specs(len(names), self.hidden, len(self.outputs)):
             raise ValueError("the layers do not follow from the features, the hidden units and the outputs")
@@ -315,7 +309,7 @@ class Manifest(BaseModel):
         return sum(math.prod(layer.shape) for layer in self.layers)
 
 
-def layer_specs(inputs: int, hidden: tuple[int, ...], outputs: int = 2) -> tuple[LayerSpec, ...]:
+def layer_specs(inputs: int, hidden: tuple[int, ...], outputs: int) -> tuple[LayerSpec, ...]:
     """Tensors of a network with `inputs` features, the given hidden units and `outputs` numbers in its answer."""
     sizes = (inputs, *hidden, outputs)
     specs: list[LayerSpec] = []

@@ -10,10 +10,10 @@ from renderer.features import FEATURES, reads_luma
 from schemas.network import NetworkSize
 from trainer.dataset import GROUP
 
-Preset = Literal["gain-curve", "paper", "paper-repaired"]
+Preset = Literal["bin-gains", "paper", "paper-repaired"]
 
 PRESETS: Final[dict[Preset, dict[str, Any]]] = {
-    "gain-curve": {},
+    "bin-gains": {},
     "paper": {"batch": 512, "lr": 1e-3, "hidden": (128, 64), "steps": 6000, "validate_every": 1000},
     "paper-repaired": {"batch": 512, "lr": 1e-3, "hidden": (128, 64), "steps": 6000, "validate_every": 1000},
 }
@@ -37,11 +37,11 @@ class TrainConfig(BaseModel):
         steps: Steps of the optimiser. Longer training fits the training assets better and held-out ones no better,
             some worse.
         batch: Rows per step.
-        lr: First learning rate; that of `gain-curve` falls along a cosine.
+        lr: First learning rate; that of `bin-gains` falls along a cosine.
         hidden: Units of the hidden layers.
-        features: Features that a `gain-curve` network may read.
+        features: Features that a `bin-gains` network may read.
         view_weight: Share of the loss that is the views' regret (sum of squares) rather than the rows' logarithm.
-        leak: Weight of the overshoot beyond a clamp.
+        leak: Weight of prices that are on the wrong side.
         validate_every: Steps between validations.
         validation_rows: Rows of each validation view that are scored.
         patience: Validations without a better score after which the training stops; 0: it never does, and no asset
@@ -58,12 +58,12 @@ class TrainConfig(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    preset: Preset = "gain-curve"
+    preset: Preset = "bin-gains"
     seed: int = 0
     steps: int = Field(default=1500, gt=0)
     batch: int = Field(default=4096, ge=GROUP)
     lr: float = Field(default=4e-3, gt=0.0)
-    hidden: tuple[int, ...] = (32, 16)
+    hidden: tuple[int, ...] = (32,)
     features: tuple[str, ...] = FEATURES
     view_weight: float = Field(default=0.5, ge=0.0, le=1.0)
     leak: float = Field(default=0.02, ge=0.0)
@@ -86,7 +86,7 @@ class TrainConfig(BaseModel):
 
     @classmethod
     def sized(cls, size: NetworkSize, **changes: Any) -> TrainConfig:
-        """The settings of a `gain-curve` network of a size, some changed."""
+        """The settings of a `bin-gains` network of a size, some changed."""
         return cls(**{**SIZES[size], **changes})
 
     @property

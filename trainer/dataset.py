@@ -1,4 +1,4 @@
-"""Label shards as training data: hull segments in CSR form, prices per view, and batches padded on the fly."""
+"""Label shards as training data: hull segments in CSR form, prices per view, and batches drawn on the fly."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from numpy.typing import NDArray
 from labeller.dataset import read_ahead
 from labeller.shard_file import BLOCK_ROWS
 from labeller.shards import Shard, read_shard
+from renderer.allocation.cuts import usable_counts
+from renderer.allocation.prices import feature_prior
 from schemas.problem import ExitCode, Problem
-from trainer.segments import SEGMENTS, hull_segments, pad_segments
+from schemas.tail import TAILS, TailName
+from trainer.segments import bin_slopes, hull_segments
 
 GROUP: Final = 128
 """Rows of a batch that share a view and a price."""
@@ -64,6 +67,8 @@ class ViewData:
         asset: What the view shows; assets are weighted equally.
         features: float32 [R, C], columns `renderer.features.FEATURES`.
         n: float32 [R], fragments.
+        tail: Of the error curves.
+        bin_counts: uint8 [R, B], fragments of each depth bin of the tail.
         offsets: int64 [R+1], segments of row r are `offsets[r]:offsets[r+1]`.
         slopes: float32 [S], error gained per fragment, > 0, falling in a row.
         lengths: float32 [S], fragments of a segment.
@@ -79,6 +84,8 @@ class ViewData:
     asset: str
     features: NDArray[np.float32]
     n: NDArray[np.float32]
+    tail: TailName
+    bin_counts: NDArray[np.uint8]
     offsets: NDArray[np.int64]
     slopes: NDArray[np.float32]
     lengths: NDArray[np.float32]
@@ -116,6 +123,7 @@ class ViewData:
             self,
             features=self.features[chosen],
             n=self.n[chosen],
+            bin_counts=self.bin_counts[chosen],
             offsets=offsets,
             slopes=self.slopes[segments],
             lengths=self.lengths[segments],
@@ -124,6 +132,10 @@ class ViewData:
             and replace(self.paper, depth=self.paper.depth[chosen], colours=self.paper.colours[chosen]),
         )
 
+    def prior(self, rows: NDArray[np.int64] | slice) -> NDArray[np.float32]:
+        """What the tail tells of the log gain of each bin of some rows, float32 [rows, B]."""
+        return feature_prior(self.features[rows], self.bin_counts[rows], TAILS[self.tail])
+
     def moments(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Means of the features and of their squares, float64 [C] each."""
         return moments(self.features)
@@ -131,7 +143,7 @@ class ViewData:
     def digest(self) -> bytes:
         """sha256 over what is trained on."""
         hasher = hashlib.sha256(self.asset.encode())
-        arrays = [self.features, self.n, self.offsets, self.slopes, self.lengths, self.anchors]
+        arrays = [self.features, self.n, self.bin_counts, self.offsets, self.slopes, self.lengths, self.anchors]
         for array in arrays + ([self.paper.depth, self.paper.colours] if self.paper is not None else []):
             hasher.update(np.ascontiguousarray(array).tobytes())
         return hasher.digest()
@@ -166,18 +178,18 @@ class Batch:
 
     Attributes:
         features: float32 [B, F].
-        n: float32 [B].
-        slopes: float32 [B, SEGMENTS], 0 where a hull has ended.
-        lengths: float32 [B, SEGMENTS], 0 where a hull has ended.
+        counts: float32 [B, bins], fragments of each depth bin that can be in a core.
+        slopes: float32 [B, bins], error that each fragment of the bin gains, by the row's hull.
+        prior: float32 [B, bins], what the tail tells of their log gain.
         log_lambda: float32 [B], one price per group.
         scale: float32 [G], mean of `(E* + lossless) / lambda` of each group's view at its price.
         share: Of the whole batch that these rows are: 1 for a process alone.
     """
 
     features: NDArray[np.float32]
-    n: NDArray[np.float32]
+    counts: NDArray[np.float32]
     slopes: NDArray[np.float32]
-    lengths: NDArray[np.float32]
+    prior: NDArray[np.float32]
     log_lambda: NDArray[np.float32]
     scale: NDArray[np.float32]
     share: float
@@ -225,6 +237,8 @@ def view_data(shard: Shard, asset: str) -> ViewData:
         asset,
         features=shard.features,
         n=shard.n,
+        tail=shard.meta.tail,
+        bin_counts=shard.bin_counts[:, : TAILS[shard.meta.tail].bins],
         hull=(shard.hull_offsets, shard.hull_k, shard.hull_error),
         price_range=shard.price_range,
         anchors=shard.anchors,
@@ -237,6 +251,8 @@ def make_view(
     *,
     features: NDArray[np.float32],
     n: NDArray[np.int32],
+    tail: TailName,
+    bin_counts: NDArray[np.uint8],
     hull: tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.float32]],
     price_range: tuple[float, float],
     anchors: Sequence[float],
@@ -248,6 +264,8 @@ def make_view(
         asset: What the view shows.
         features: float32 [R, C].
         n: int32 [R], fragments.
+        tail: Of the error curves.
+        bin_counts: uint8 [R, B], fragments of each depth bin.
         hull: Offsets int64 [R+1], k int32 [M] and error float32 [M] of the hulls' vertices.
         price_range: Natural logarithms of the least and the greatest lambda that matter.
         anchors: log lambda at the budgets that are scored.
@@ -268,6 +286,8 @@ def make_view(
         asset=asset,
         features=features,
         n=n.astype(np.float32),
+        tail=tail,
+        bin_counts=np.ascontiguousarray(bin_counts),
         offsets=offsets,
         slopes=slopes,
         lengths=lengths,
@@ -302,8 +322,9 @@ def sample_batch(
     total = max(1, size // GROUP)
     groups = len(range(how.rank, total, how.size))
     features = np.empty((groups * GROUP, len(columns)), dtype=np.float32)
-    n, log_lambda = (np.empty(groups * GROUP, dtype=np.float32) for _ in range(2))
-    slopes, lengths = (np.zeros((groups * GROUP, SEGMENTS), dtype=np.float32) for _ in range(2))
+    log_lambda = np.empty(groups * GROUP, dtype=np.float32)
+    bins = views[0].bin_counts.shape[1]
+    counts, slopes, prior = (np.zeros((groups * GROUP, bins), dtype=np.float32) for _ in range(3))
     scale = np.empty(groups, dtype=np.float32)
     for g, view, rng in draw_views(views, seed, total, how):
         rows = rng.integers(view.rows, size=GROUP)
@@ -316,10 +337,11 @@ def sample_batch(
         if len(how.noise):
             noise = np.random.default_rng((*seed, g)).standard_normal((GROUP, len(columns)), dtype=np.float32)
             features[part] += how.noise * noise
-        n[part], log_lambda[part] = view.n[rows], price
-        pad_segments(view.offsets, view.slopes, view.lengths, rows, slopes[part], lengths[part])
+        log_lambda[part] = price
+        counts[part], prior[part] = usable_counts(view.bin_counts[rows]), view.prior(rows)
+        bin_slopes(view.offsets, view.slopes, view.lengths, rows, counts[part], slopes[part])
         scale[own] = np.exp(np.interp(price, view.price_grid, np.log(view.scale_grid)))
-    return Batch(features, n, slopes, lengths, log_lambda, scale, groups / total)
+    return Batch(features, counts, slopes, prior, log_lambda, scale, groups / total)
 
 
 def draw_views(

@@ -30,28 +30,24 @@ class Dialect:
     Attributes:
         name: As people write it.
         constant: A local constant, with `{name}` and `{value}`; a scalar of float32.
-        scalar: The type of a scalar.
         vector: The type of a vector of float32, with `{n}`.
         half_constant: A local constant of `half_vector`.
         half_vector: The type of four numbers in float16; "" where there is no such form.
         half_prelude: Lines before all others of a form in float16.
-        outputs: The line that states how many numbers are answered, with `{n}`.
-        predict: The head of the function of the network, with `{type}`.
+        outputs: The lines that state how many numbers are answered, with `{n}`, and the type of an answer.
+        predict: The head of the function of the network.
+        answer: Its last line, with `{values}`.
     """
 
     name: str
     constant: str
-    scalar: str
     vector: str
     half_constant: str
     half_vector: str
     half_prelude: tuple[str, ...]
     outputs: str
     predict: str
-
-    def answer(self, count: int) -> str:
-        """The type of `count` outputs."""
-        return self.scalar if count == 1 else self.vector.format(n=count)
+    answer: str
 
     def features(self, names: Sequence[str]) -> str:
         """`diaphane_features`, from the raw sums of a pixel to the features `names`; all zeros where n = 0.
@@ -70,7 +66,6 @@ class Dialect:
 GLSL: Final = Dialect(
     name="GLSL",
     constant="float {name} = {value};",
-    scalar="float",
     vector="vec{n}",
     half_constant="DIAPHANE_HALF4 {name} = {value};",
     half_vector="DIAPHANE_HALF4",
@@ -84,32 +79,33 @@ GLSL: Final = Dialect(
         "#define DIAPHANE_HALF4 vec4",
         "#endif",
     ),
-    outputs="#define DIAPHANE_OUTPUTS {n}",
-    predict="{type} diaphane_predict(in float x[DIAPHANE_FEATURES]) {{",
+    outputs="#define DIAPHANE_OUTPUTS {n}\nstruct DiaphaneAnswer {{ float y[DIAPHANE_OUTPUTS]; }};",
+    predict="DiaphaneAnswer diaphane_predict(in float x[DIAPHANE_FEATURES]) {",
+    answer="return DiaphaneAnswer(float[DIAPHANE_OUTPUTS]({values}));",
 )
 
 HLSL: Final = Dialect(
     name="HLSL",
     constant="float {name} = {value};",
-    scalar="float",
     vector="float{n}",
     half_constant="",
     half_vector="",
     half_prelude=(),
-    outputs="#define DIAPHANE_OUTPUTS {n}",
-    predict="{type} diaphane_predict(in float x[DIAPHANE_FEATURES]) {{",
+    outputs="#define DIAPHANE_OUTPUTS {n}\nstruct DiaphaneAnswer {{ float y[DIAPHANE_OUTPUTS]; }};",
+    predict="DiaphaneAnswer diaphane_predict(in float x[DIAPHANE_FEATURES]) {",
+    answer="DiaphaneAnswer answer = {{ {{ {values} }} }};\n    return answer;",
 )
 
 WGSL: Final = Dialect(
     name="WGSL",
     constant="let {name} = {value};",
-    scalar="f32",
     vector="vec{n}f",
     half_constant="let {name} = {value};",
     half_vector="vec4h",
     half_prelude=("enable f16;",),
-    outputs="const DIAPHANE_OUTPUTS = {n};",
-    predict="fn diaphane_predict(x: array<f32, DIAPHANE_FEATURES>) -> {type} {{",
+    outputs="const DIAPHANE_OUTPUTS = {n};\nstruct DiaphaneAnswer {{ y: array<f32, DIAPHANE_OUTPUTS> }}",
+    predict="fn diaphane_predict(x: array<f32, DIAPHANE_FEATURES>) -> DiaphaneAnswer {",
+    answer="return DiaphaneAnswer(array<f32, DIAPHANE_OUTPUTS>({values}));",
 )
 
 

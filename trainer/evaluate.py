@@ -14,7 +14,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.allocation.fill import solve_lambda
+from renderer.allocation.cuts import events_of, solve_cuts
+from renderer.allocation.prices import gain_prices, ranks_of
 from trainer.dataset import ViewData, lossless_error
 from trainer.paper import Fill, importance_counts
 from trainer.weights import Weights
@@ -78,7 +79,7 @@ def score_allocation(view: ViewData, log_lambda: float, allocate: Callable[[int]
 
 
 def evaluate(weights: Weights, views: Iterable[ViewData], fill: Fill = "budget") -> list[BudgetScore]:
-    """Every view at its scored budgets; without any, a gain-curve network is scored in the middle of its prices.
+    """Every view at its scored budgets; without any, a bin-gains network is scored in the middle of its prices.
 
     Args:
         weights: The predictor.
@@ -103,9 +104,9 @@ def scored_prices(view: ViewData) -> list[float]:
 def _allocation(weights: Weights, view: ViewData, fill: Fill) -> Allocate:
     if weights.head == "importance":
         return lambda level, budget: importance_counts(weights, view, level, budget, fill)
-    a, b = weights.predict(view.features)
-    n = view.n.astype(np.int32)
-    return lambda level, budget: solve_lambda(a, b, n, budget)[0]
+    prices = gain_prices(weights.run(view.features), view.prior(slice(None)))
+    events = events_of(ranks_of(prices, view.bin_counts), view.bin_counts)
+    return lambda level, budget: solve_cuts(events, budget).k
 
 
 @numba.njit(cache=True)

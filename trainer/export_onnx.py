@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import groupby
 from typing import Final
 
 import numpy as np
@@ -18,10 +19,11 @@ IR_VERSION: Final = 8
 
 
 def onnx_model(weights: Weights) -> bytes:
-    """Serialised model: input `features` float32 [pixels, F] (raw), outputs float32 [pixels] each.
+    """Serialised model: input `features` float32 [pixels, F] (raw), output `answers` float32 [pixels, outputs].
 
     The normalisation is not folded into the first layer: with a feature of small spread that would cancel in float32.
     """
+    names = weights.outputs
     nodes: list[onnx.NodeProto] = []
     constants: list[onnx.TensorProto] = []
 
@@ -46,27 +48,21 @@ def onnx_model(weights: Weights) -> bytes:
         if i < last:
             nodes.append(helper.make_node("Relu", [current], [f"hidden{i}"]))
             current = f"hidden{i}"
-    axis = constant("axis", np.array([1], dtype=np.int64))
-    columns = [f"{name}_raw" for name in weights.outputs]
-    nodes.append(
-        helper.make_node("Split", [current, constant("sizes", np.ones(len(columns), np.int64))], columns, axis=1)
-    )
-    for name, column in zip(weights.outputs, columns, strict=True):
-        function, scale, offset = ACTIVATIONS[name]
+    runs = [(function, len(list(same))) for function, same in groupby(ACTIVATIONS[name] for name in names)]
+    parts = [f"raw_{function}" for function, _ in runs] if len(runs) > 1 else [current]
+    if len(runs) > 1:
+        sizes = constant("sizes", np.array([count for _, count in runs], np.int64))
+        nodes.append(helper.make_node("Split", [current, sizes], parts, axis=1))
+    for i, (function, _) in enumerate(runs):
         if function != "identity":
-            nodes.append(helper.make_node(function.capitalize(), [column], [f"{name}_{function}"]))
-            column = f"{name}_{function}"
-        for operator, factor, neutral in (("Mul", scale, 1.0), ("Add", offset, 0.0)):
-            if factor != neutral:
-                value = constant(f"{name}_{operator.lower()}_by", np.array([factor], np.float32))
-                nodes.append(helper.make_node(operator, [column, value], [f"{name}_{operator.lower()}"]))
-                column = f"{name}_{operator.lower()}"
-        nodes.append(helper.make_node("Squeeze", [column, axis], [name]))
+            nodes.append(helper.make_node(function.capitalize(), [parts[i]], [function]))
+            parts[i] = function
+    nodes.append(helper.make_node("Concat", parts, ["answers"], axis=1))
     graph = helper.make_graph(
         nodes,
         weights.head,
         [helper.make_tensor_value_info("features", TensorProto.FLOAT, ["pixels", len(weights.features)])],
-        [helper.make_tensor_value_info(name, TensorProto.FLOAT, ["pixels"]) for name in weights.outputs],
+        [helper.make_tensor_value_info("answers", TensorProto.FLOAT, ["pixels", len(names)])],
         constants,
     )
     model = helper.make_model(

@@ -78,18 +78,16 @@ def half_source(weights: Weights, dialect: Dialect = GLSL) -> str:
 
 def framed(weights: Weights, dialect: Dialect, body: Sequence[str]) -> str:
     """The features, and the function of the network: lines that give its raw outputs, then their activations."""
-    answers = [activated(name) for name in weights.outputs]
-    kind = dialect.answer(len(answers))
-    value = answers[0] if len(answers) == 1 else f"{kind}({', '.join(answers)})"
+    answers = ", ".join(activated(name) for name in weights.outputs)
     return "\n".join(
         [
             dialect.features(weights.features),
-            dialect.outputs.format(n=len(answers)),
+            dialect.outputs.format(n=len(weights.outputs)),
             "",
             f"// x: features. Returns {', '.join(weights.outputs)}.",
-            dialect.predict.format(type=kind),
+            dialect.predict,
             *(f"    {line}" for line in body),
-            f"    return {value};",
+            f"    {dialect.answer.format(values=answers)}",
             "}",
             "",
         ]
@@ -98,11 +96,7 @@ def framed(weights: Weights, dialect: Dialect, body: Sequence[str]) -> str:
 
 def activated(name: OutputName) -> str:
     """The expression of an output whose raw value bears its name."""
-    function, scale, offset = ACTIVATIONS[name]
-    expression = _FUNCTIONS[function].format(x=name)
-    if scale != 1.0:
-        expression = f"{literal(np.float32(scale))} * ({expression})"
-    return expression if offset == 0.0 else f"{expression} + {literal(np.float32(offset))}"
+    return _FUNCTIONS[ACTIVATIONS[name]].format(x=name)
 
 
 def normalised(weights: Weights) -> list[str]:

@@ -50,7 +50,7 @@ def ubo_source(weights: Weights, *, half: bool = False) -> str:
         body += _layer(word, inputs, outputs, source, f"h{number}", halves=half and not last, last=last)
         word += outputs + outputs * inputs * (2 if half and not last else 4)
         source = f"h{number}"
-    body += [f"float {name} = {source}[0].{c};" for name, c in zip(weights.outputs, "xyzw", strict=False)]
+    body += [f"float {name} = {source}[{i // 4}].{'xyzw'[i % 4]};" for i, name in enumerate(weights.outputs)]
     prelude = "\n".join([*(GLSL.half_prelude if half else ()), *_declaration(word, half)])
     return prelude + framed(weights, GLSL, body)
 

@@ -27,22 +27,14 @@ void main() {{
     if (row >= rows) return;
     float x[DIAPHANE_FEATURES];
     for (int i = 0; i < DIAPHANE_FEATURES; ++i) x[i] = inputs[row * uint(DIAPHANE_FEATURES) + uint(i)];
-#if DIAPHANE_OUTPUTS == 1
-    outputs[row] = diaphane_predict(x);
-#elif DIAPHANE_OUTPUTS == 2
-    vec2 y = diaphane_predict(x);
-#else
-    vec3 y = diaphane_predict(x);
-#endif
-#if DIAPHANE_OUTPUTS > 1
-    for (int i = 0; i < DIAPHANE_OUTPUTS; ++i) outputs[row * uint(DIAPHANE_OUTPUTS) + uint(i)] = y[i];
-#endif
+    DiaphaneAnswer found = diaphane_predict(x);
+    for (int i = 0; i < DIAPHANE_OUTPUTS; ++i) outputs[row * uint(DIAPHANE_OUTPUTS) + uint(i)] = found.y[i];
 }}
 """
 
 
 def glsl_outputs(
-    path: Path, inputs: NDArray[np.float32], ctx: moderngl.Context, outputs: int = 2, data: Path | None = None
+    path: Path, inputs: NDArray[np.float32], ctx: moderngl.Context, outputs: int, data: Path | None = None
 ) -> NDArray[np.float32]:
     """What a GLSL file answers.
 

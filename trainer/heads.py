@@ -12,11 +12,14 @@ import torch
 from torch import Tensor
 
 from renderer.features import FEATURES
+from schemas.bundle import gain_outputs
+from schemas.problem import Problem
+from schemas.tail import TAILS, TailName
 from trainer.adam import Adam
 from trainer.config import Preset, TrainConfig
 from trainer.dataset import Batch, Drawing, ViewData, normalisation, sample_batch
 from trainer.evaluate import BudgetScore, evaluate
-from trainer.loss import lagrangian_regret
+from trainer.loss import lagrangian_regret, rising_prices
 from trainer.models import Network
 from trainer.paper import LABEL_PEAK, PAPER_FEATURES, Fill, paper_batch, paper_inputs, unscored
 from trainer.sgd import Optimiser, Sgd
@@ -55,8 +58,8 @@ class Head(Protocol):
         """How near its allocations come to the optimum."""
 
 
-class GainCurveHead:
-    """`a` and `b` of a pixel's gain curve, by Lagrangian regret and Adam (METHOD.md section 4)."""
+class BinGainsHead:
+    """The gain of every depth bin, by Lagrangian regret and Adam (METHOD.md section 4)."""
 
     def network(self, views: Sequence[View], config: TrainConfig) -> Network:
         """See `Head`."""
@@ -65,12 +68,12 @@ class GainCurveHead:
         names = names or [FEATURES[0]]
         columns = [FEATURES.index(name) for name in names]
         torch.manual_seed(config.seed)
-        network = Network(names, mean[columns], np.maximum(std[columns], CONSTANT), config.hidden)
+        outputs = gain_outputs(TAILS[_tail_of(views)].bins)
+        spread = np.maximum(std[columns], CONSTANT)
+        network = Network(names, mean[columns], spread, config.hidden, "bin-gains", outputs)
         with torch.no_grad():
-            # Start where the first guess is of the right size: the middle of the prices, one e-fold per fragment.
-            last = network.dense[-1]
-            last.bias[0] = float(np.mean([np.mean(view.price_range) for view in views]))
-            last.bias[1] = 0.5
+            # Start where the first guess is of the right size: the middle of the prices.
+            network.dense[-1].bias[:-1] = float(np.mean([np.mean(view.price_range) for view in views]))
         return network
 
     def optimiser(self, network: Network) -> Optimiser:
@@ -155,7 +158,7 @@ class PaperHead:
 
 
 HEADS: Final[dict[Preset, Head]] = {
-    "gain-curve": GainCurveHead(),
+    "bin-gains": BinGainsHead(),
     "paper": PaperHead(is_repaired=False),
     "paper-repaired": PaperHead(is_repaired=True),
 }
@@ -168,16 +171,32 @@ def batch_loss(network: Network, batch: Batch, config: TrainConfig) -> Tensor:
     `log(1 + mean r / mean (E* / lambda))` is the logarithm of a view's Lagrangian over its optimum's, which is what
     is scored.
     """
-    features, n, slopes, lengths, log_lambda, scale = (
+    features, counts, slopes, prior, log_lambda, scale = (
         torch.from_numpy(array)
-        for array in (batch.features, batch.n, batch.slopes, batch.lengths, batch.log_lambda, batch.scale)
+        for array in (batch.features, batch.counts, batch.slopes, batch.prior, batch.log_lambda, batch.scale)
     )
-    a, b = network(features).unbind(dim=1)
-    regret, overshoot = lagrangian_regret(a, b, n, slopes, lengths, log_lambda)
-    rows = torch.log1p(torch.relu(regret)).mean()
-    views = torch.log1p(torch.relu(regret.view(len(scale), -1).mean(dim=1)) / scale).mean()
-    leak = torch.log1p(overshoot).mean()
+    answers = network(features)
+    prices = rising_prices(answers[:, :-1] + answers[:, -1:] * prior, counts)
+    regret, astray = lagrangian_regret(prices, counts, slopes, log_lambda)
+    rows = torch.log1p(regret).mean()
+    views = torch.log1p(regret.view(len(scale), -1).mean(dim=1) / scale).mean()
+    leak = torch.log1p(astray).mean()
     return (1.0 - config.view_weight) * rows + config.view_weight * views + config.leak * leak
+
+
+def _tail_of(views: Sequence[View]) -> TailName:
+    """The tail of all views.
+
+    Raises:
+        Problem: They have several.
+    """
+    tails = sorted({view.tail for view in views})
+    if len(tails) > 1:
+        raise Problem(
+            f"The training views have the tails {', '.join(tails)}: a network is trained for one.",
+            "Label all scenes with one tail.",
+        )
+    return tails[0]
 
 
 def _paper_moments(view: ViewData) -> tuple[np.ndarray, np.ndarray] | None:

@@ -1,47 +1,51 @@
-"""The Lagrangian regret: what a predicted count costs more than the best one at a price `lambda` per fragment."""
+"""The Lagrangian regret: what predicted cuts cost more than the best ones at a price `lambda` per fragment."""
 
 from __future__ import annotations
+
+from typing import Final
 
 import torch
 from torch import Tensor
 
+SOFTNESS: Final = 0.35
+"""In log gain: within about this of the price, a bin counts as partly taken, so that there is a gradient."""
 
-def lagrangian_regret(
-    a: Tensor,
-    b: Tensor,
-    n: Tensor,
-    slopes: Tensor,
-    lengths: Tensor,
-    log_lambda: Tensor,
-) -> tuple[Tensor, Tensor]:
-    """Regret of `k = clamp(1 + (a - log lambda) / b, 0, n)` (METHOD.md section 4).
+EMPTY_GAIN: Final = 60.0
+"""Of bins without fragments: far above any other, so that they are no reason to leave out those behind them."""
 
-    `r = (E(k) + lambda k - min_j (E(j) + lambda j)) / lambda` with E the lower hull of the pixel's error curve,
-    interpolated: `E(k) = sum_j s_j (len_j - clamp(k - k_j, 0, len_j))`. The optimum takes exactly the segments
-    with `s_j > lambda`. Each segment's two terms are subtracted before they are scaled, so r is 0, not nearly 0,
-    at the optimum.
+
+def rising_prices(gains: Tensor, counts: Tensor) -> Tensor:
+    """Log prices below which bins are in the core, float32 [R, B]: none is below those of the bins in front of it.
 
     Args:
-        a: float32 [R], predicted log gain of the first fragment.
-        b: float32 [R], predicted fall of the log gain per fragment, > 0.
-        n: float32 [R], fragments.
-        slopes: float32 [R, H], error gained per fragment, falling along H; 0 where a hull has ended.
-        lengths: float32 [R, H], fragments of each segment; 0 where a hull has ended.
-        log_lambda: float32 [R], natural logarithm of the price.
+        gains: float32 [R, B], predicted log gain of each fragment of a bin.
+        counts: float32 [R, B], fragments of each bin.
+    """
+    gains = torch.where(counts > 0.0, gains, EMPTY_GAIN)
+    return torch.cummax(-gains, dim=1).values
+
+
+def lagrangian_regret(prices: Tensor, counts: Tensor, slopes: Tensor, log_lambda: Tensor) -> tuple[Tensor, Tensor]:
+    """Regret of taking the bins whose price is below `-log lambda` (METHOD.md section 4).
+
+    `r = sum_b n_b |s_b / lambda - 1| |w_b - t_b|`: s_b what each fragment of bin b gains by the lower hull of the
+    pixel's error, `w_b` whether the optimum takes it (`s_b > lambda`), `t_b` how far it is taken. It is what
+    `E(cut) + lambda k` is above its least value, in units of lambda, for a `t` of whole bins.
+
+    Args:
+        prices: float32 [R, B], rising along B.
+        counts: float32 [R, B], fragments of each bin.
+        slopes: float32 [R, B], falling along B.
+        log_lambda: float32 [R], natural logarithm of the price of a fragment.
 
     Returns:
         r: float32 [R] >= 0, in fragments.
-        overshoot: float32 [R] >= 0, by how far the count was beyond a clamp although the optimum is not there:
-            the gradient that the clamp hides.
+        astray: float32 [R] >= 0, by how much prices are on the wrong side: the gradient that far-off bins lack.
     """
-    wanted = 1.0 + (a - log_lambda) / b
-    k = torch.minimum(torch.relu(wanted), n)
+    beyond = -log_lambda[:, None] - prices
+    taken = torch.sigmoid(beyond / SOFTNESS)
     ratio = slopes * torch.exp(-log_lambda)[:, None]
-    taken = lengths * (ratio > 1.0)
-    start = torch.cumsum(lengths, dim=1) - lengths
-    covered = torch.minimum(torch.clamp(k[:, None] - start, min=0.0), lengths)
-    best = taken.sum(dim=1)
-    r = (ratio * (taken - covered)).sum(dim=1) + (k - best)
-    above = torch.relu(wanted - n) * (best < n)
-    below = torch.relu(-wanted) * (best > 0)
-    return r, above + below
+    wanted = (ratio > 1.0).float()
+    r = (counts * (ratio - 1.0).abs() * (wanted - taken).abs()).sum(dim=1)
+    astray = (torch.relu(beyond * (1.0 - 2.0 * wanted)) * (counts > 0.0)).sum(dim=1)
+    return r, astray

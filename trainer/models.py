@@ -19,11 +19,7 @@ _FUNCTIONS: Final = {"identity": lambda x: x, "softplus": nn.functional.softplus
 
 def activate(outputs: Sequence[OutputName], raw: Tensor) -> Tensor:
     """A network's answer, float32 [R, outputs], from what its last layer gives, of the same shape."""
-    columns = []
-    for i, name in enumerate(outputs):
-        function, scale, offset = ACTIVATIONS[name]
-        columns.append(scale * _FUNCTIONS[function](raw[:, i]) + offset)
-    return torch.stack(columns, dim=1)
+    return torch.stack([_FUNCTIONS[ACTIVATIONS[name]](raw[:, i]) for i, name in enumerate(outputs)], dim=1)
 
 
 class Network(nn.Module):
@@ -46,9 +42,9 @@ class Network(nn.Module):
         features: Sequence[str],
         mean: NDArray[np.float32],
         std: NDArray[np.float32],
-        hidden: Sequence[int] = (32, 16),
-        head: HeadName = "gain-curve",
-        outputs: Sequence[OutputName] = ("a", "b"),
+        hidden: Sequence[int],
+        head: HeadName,
+        outputs: Sequence[OutputName],
     ) -> None:
         super().__init__()
         self.features, self.head, self.outputs = tuple(features), head, tuple(outputs)

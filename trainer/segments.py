@@ -1,4 +1,4 @@
-"""Segments of hulls in CSR form: made of their vertices, and padded to rows of a batch."""
+"""Segments of hulls in CSR form: made of their vertices, and looked up for the bins of a batch."""
 
 from __future__ import annotations
 
@@ -57,26 +57,31 @@ def hull_segments(
 
 
 @numba.njit(cache=True)
-def pad_segments(
+def bin_slopes(
     offsets: NDArray[np.int64],
     slopes: NDArray[np.float32],
     lengths: NDArray[np.float32],
     rows: NDArray[np.int64],
-    out_slopes: NDArray[np.float32],
-    out_lengths: NDArray[np.float32],
+    counts: NDArray[np.float32],
+    out: NDArray[np.float32],
 ) -> None:
-    """Write the segments of some rows side by side; what a row has no segment for stays as it is.
+    """What each fragment of a bin gains, by the segment that its middle lies in; 0 behind the last one.
 
     Args:
         offsets: int64 [R+1], segments of row r are `offsets[r]:offsets[r+1]`.
         slopes: float32 [S].
         lengths: float32 [S].
         rows: int64 [B], rows, in any order.
-        out_slopes: float32 [B, SEGMENTS].
-        out_lengths: float32 [B, SEGMENTS].
+        counts: float32 [B, bins], fragments of each bin of these rows.
+        out: float32 [B, bins].
     """
     for i in range(len(rows)):
-        first = offsets[rows[i]]
-        for j in range(offsets[rows[i] + 1] - first):
-            out_slopes[i, j] = slopes[first + j]
-            out_lengths[i, j] = lengths[first + j]
+        j, last = offsets[rows[i]], offsets[rows[i] + 1]
+        ends = lengths[j] if j < last else np.float32(0.0)
+        before = np.float32(0.0)
+        for b in range(counts.shape[1]):
+            while j < last and before + 0.5 * counts[i, b] >= ends:
+                j += 1
+                ends += lengths[j] if j < last else np.float32(0.0)
+            out[i, b] = slopes[j] if j < last else 0.0
+            before += counts[i, b]

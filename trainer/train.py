@@ -172,7 +172,7 @@ class _Run:
         rows = min(config.validation_rows, max(LEAST_VALIDATION_ROWS, config.pool_rows // len(judges)))
         # The first process validates for all.
         self._validation = [view.subset(rows, config.seed) for view in judges] if team.rank == 0 else []
-        if config.preset != "gain-curve" and self._validation and not any(len(x.anchors) for x in self._validation):
+        if config.preset != "bin-gains" and self._validation and not any(len(x.anchors) for x in self._validation):
             raise Problem(
                 "No validation view is scored at a budget, so nothing tells which state is best.",
                 "Hold out a view of more fragments than its budgets.",
@@ -234,7 +234,7 @@ class _Run:
 
 
 def _check(config: TrainConfig, start: Weights | None, team: Team) -> None:
-    expected = "gain-curve" if config.preset == "gain-curve" else "importance"
+    expected = "bin-gains" if config.preset == "bin-gains" else "importance"
     if start is not None and start.head != expected:
         raise Problem(
             f"A network with the head {start.head} cannot be trained as {config.preset}.",

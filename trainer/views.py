@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from labeller.dataset import read_ahead
 from labeller.shard_file import BLOCK_ROWS
 from labeller.shards import read_rows, read_shard
+from schemas.tail import TailName
 from trainer.dataset import ViewData, moments, refuse_empty, view_data
 
 READERS: Final = 2
@@ -35,6 +36,7 @@ class View(Protocol):
     Attributes:
         asset: What it shows.
         rows: Sampled pixels.
+        tail: Tail of its error curves.
         price_range: Natural logarithms of the least and the greatest lambda that are drawn.
     """
 
@@ -45,6 +47,10 @@ class View(Protocol):
     @property
     def rows(self) -> int:
         """Sampled pixels."""
+
+    @property
+    def tail(self) -> TailName:
+        """Tail of its error curves."""
 
     @property
     def price_range(self) -> tuple[float, float]:
@@ -87,6 +93,11 @@ class ShardView:
     def asset(self) -> str:
         """See `View`."""
         return self.outline.asset
+
+    @property
+    def tail(self) -> TailName:
+        """See `View`."""
+        return self.outline.tail
 
     @property
     def price_range(self) -> tuple[float, float]:
@@ -224,6 +235,7 @@ def _joined(parts: Sequence[ViewData]) -> ViewData:
         parts[0],
         features=np.concatenate([part.features for part in parts]),
         n=np.concatenate([part.n for part in parts]),
+        bin_counts=np.concatenate([part.bin_counts for part in parts]),
         offsets=np.concatenate([np.zeros(1, np.int64), *offsets]),
         slopes=np.concatenate([part.slopes for part in parts]),
         lengths=np.concatenate([part.lengths for part in parts]),

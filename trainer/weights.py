@@ -41,8 +41,8 @@ class Weights:
     mean: NDArray[np.float32]
     std: NDArray[np.float32]
     layers: tuple[Layer, ...]
-    head: HeadName = "gain-curve"
-    outputs: tuple[OutputName, ...] = ("a", "b")
+    head: HeadName
+    outputs: tuple[OutputName, ...]
 
     @property
     def columns(self) -> list[int]:
@@ -93,27 +93,10 @@ class Weights:
             answers[part] = activate(self.outputs, x @ weight.T + bias)
         return answers
 
-    def predict(self, features: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Gain curves of pixels; the head must be `gain-curve`.
-
-        Args:
-            features: float32 [R, C], columns `renderer.features.FEATURES`.
-
-        Returns:
-            a and b, float32 [R] each: the log gain of core fragment k is `a - b (k - 1)`, b >= GAIN_FLOOR.
-        """
-        answers = self.run(features)
-        a, b = (np.ascontiguousarray(answers[:, self.outputs.index(name)]) for name in ("a", "b"))
-        return a, b
-
 
 def activate(outputs: Sequence[OutputName], raw: NDArray[np.float32]) -> NDArray[np.float32]:
     """A network's answer, float32 [R, outputs], from what its last layer gives, of the same shape."""
-    columns = []
-    for i, name in enumerate(outputs):
-        function, scale, offset = ACTIVATIONS[name]
-        columns.append(np.float32(scale) * _FUNCTIONS[function](raw[:, i]) + np.float32(offset))
-    return np.stack(columns, axis=1)
+    return np.stack([_FUNCTIONS[ACTIVATIONS[name]](raw[:, i]) for i, name in enumerate(outputs)], axis=1)
 
 
 def _softplus(x: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -16,7 +16,6 @@ from benchmarks.predicting.store import Store, key_of
 from benchmarks.predicting.training import Trainings
 from benchmarks.predicting.variants import Variant
 from benchmarks.predicting.views import ViewRow, load_dump
-from renderer.features import derive, gather
 from trainer.dataset import LOSSLESS_MSE
 from trainer.weights import Weights
 
@@ -66,8 +65,7 @@ def _score_fold(trainings: Trainings, variant: Variant, fold: int) -> list[Row]:
 def _score_view(store: Store, row: ViewRow, variant: Variant, weights: Weights) -> Row:
     dump, labels, oracle = load_dump(store, row), labels_of(store, row, variant.tail), oracle_of(store, row)
     curves = labels.curves(dump)
-    features = derive(gather(dump, variant.tail))
-    occupied, events = frame_events(dump, variant.tail, *weights.predict(features[dump.counts > 0]))
+    occupied, events = frame_events(dump, variant.tail, weights)
     errors = [curves.total(core_of(dump, occupied, events, budget)) / (3 * row.pixels) for budget in row.budgets]
     best = [min(labels.mse[rule][i] for rule in RIVALS) for i in range(len(errors))]
     return {

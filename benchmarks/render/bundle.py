@@ -12,13 +12,13 @@ import numpy as np
 
 from renderer.context import describe
 from renderer.features import FEATURES
-from schemas.bundle import Provenance, TailSpec
-from schemas.tail import DEFAULT_TAIL, DENSITY_G
+from schemas.bundle import Provenance, TailSpec, gain_outputs
+from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAILS
 from services.stress.predictors import random_layers
 from trainer.bundle import Description, export_bundle
 from trainer.weights import Weights
 
-HIDDEN = (32, 16)
+HIDDEN = (32,)
 """Units of the trainer's default network."""
 
 
@@ -26,9 +26,10 @@ HIDDEN = (32, 16)
 def random_bundle(ctx: moderngl.Context) -> Iterator[Path]:
     """A bundle of the usual shape with random weights: as fast as a trained one, but its pictures mean nothing."""
     rng = np.random.default_rng(3)
-    layers = random_layers(rng, HIDDEN)
+    outputs = gain_outputs(TAILS[DEFAULT_TAIL].bins)
+    layers = random_layers(rng, HIDDEN, len(outputs))
     mean, std = np.zeros(len(FEATURES), dtype=np.float32), np.ones(len(FEATURES), dtype=np.float32)
-    weights = Weights(FEATURES, mean, std, layers)
+    weights = Weights(FEATURES, mean, std, layers, "bin-gains", outputs)
     description = Description(
         name="random",
         tail=TailSpec(name=DEFAULT_TAIL, g=DENSITY_G),

@@ -1,10 +1,9 @@
-"""From weights or predicted gain curves to fragment counts that use a budget exactly.
+"""From weights to fragment counts that use a budget exactly.
 
-Both fills look for one scalar `t` at which the counts `clamp(floor(c + (a_p + t) m_p), 0, n_p)` sum to the
-budget: `budget_fill` with `t` the scale of the weights, `solve_lambda` with `t = -log lambda`. The counts do
-not fall with `t`, in floating point too, so `t` is bracketed down to neighbouring float64 numbers; what is then
-still missing goes to the pixels that grow at the upper one (they have the largest fractions), by pixel index.
-Sums are of integers: results do not depend on the number of threads.
+`budget_fill` looks for the scale `t` at which the counts `clamp(floor(t w_p), 0, n_p)` sum to the budget. The counts do
+not fall with `t`, in floating point too, so `t` is bracketed down to neighbouring float64 numbers; what is then still
+missing goes to the pixels that grow at the upper one (they have the largest fractions), by pixel index. Sums are of
+integers: results do not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -40,35 +39,8 @@ def budget_fill(weights: NDArray[np.floating], n: NDArray[np.integer], budget: i
         rest = np.where(weighted, counts, 0).astype(np.int32)
         others = np.where(weighted, 0, counts).astype(np.int32)
         left = budget - int(rest.sum(dtype=np.int64))
-        return rest + _fill(others, np.zeros(1), np.ones(len(counts)), 0.0, left)[0]
-    return _fill(counts, np.zeros(1), np.where(weighted, scaled, 0.0), 0.0, budget)[0]
-
-
-def solve_lambda(
-    a: NDArray[np.floating], b: NDArray[np.floating], n: NDArray[np.integer], budget: int
-) -> tuple[NDArray[np.int32], float]:
-    """The counts of predicted gain curves at the one `lambda` that uses a budget (METHOD section 4).
-
-    `k_p(lambda) = clamp(floor(1.5 + (a_p - log lambda) / b_p), 0, n_p)`.
-
-    Args:
-        a: [P], log gain of the first fragment; finite.
-        b: [P], decay of the log gain per fragment; finite, > 0.
-        n: [P], fragments of each pixel.
-        budget: F >= 0, fragments to spend.
-
-    Returns:
-        int32 [P] with `sum k = min(F, sum n)`, and `log lambda` at which `sum k(lambda) <= F` is largest; what
-        is missing there goes to the pixels that grow at the next smaller lambda, by pixel index.
-
-    Raises:
-        ValueError: If a value is not finite, a `b` is not positive, or the budget is negative.
-    """
-    gain, decay = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
-    if not (np.isfinite(gain).all() and np.isfinite(decay).all() and decay.min(initial=1.0) > 0.0):
-        raise ValueError("gain curves must be finite, with positive decay")
-    k, t = _fill(np.asarray(n, dtype=np.int32), gain, 1.0 / np.maximum(decay, 1e-12), 1.5, budget)
-    return k, -t
+        return rest + _fill(others, np.ones(len(counts)), left)
+    return _fill(counts, np.where(weighted, scaled, 0.0), budget)
 
 
 def paper_fill(weights: NDArray[np.floating], budget: int) -> NDArray[np.int32]:
@@ -96,18 +68,13 @@ def _checked(weights: NDArray[np.floating]) -> NDArray[np.float64]:
     return numbers
 
 
-def _fill(
-    n: NDArray[np.int32], a: NDArray[np.float64], m: NDArray[np.float64], c: float, budget: int
-) -> tuple[NDArray[np.int32], float]:
-    """Counts that sum to `min(budget, sum n)`, and the largest `t` whose own counts do not exceed that.
-
-    `a` has one entry per pixel, or one for all.
-    """
+def _fill(n: NDArray[np.int32], rate: NDArray[np.float64], budget: int) -> NDArray[np.int32]:
+    """Counts `clamp(floor(t rate), 0, n)` that sum to `min(budget, sum n)`, with what is missing at the best t."""
     total = int(n.sum(dtype=np.int64))
     if budget < 0:
         raise ValueError(f"a budget cannot be negative: {budget}")
     target = min(budget, total)
-    low, high = _bracket(n, a, m, c)
+    low, high = _bracket(n, rate)
     low_sum, high_sum = 0, total
     # Bounds of where counts first grow above low, and last grew below high; they meet on ties.
     first, last = low, high
@@ -121,20 +88,20 @@ def _fill(
             middle = _halfway(low, high)
         if middle == low:
             break
-        count = _count(n, a, m, c, middle)
+        count = _count(n, rate, middle)
         above, below = middle, middle
         if count in (low_sum, high_sum):  # nothing changes here: jump to where something does
-            above, below = _neighbours(n, a, m, c, middle)
+            above, below = _neighbours(n, rate, middle)
         if count <= target:
             low, low_sum, first = middle, count, max(first, min(above, high))
         else:
             high, high_sum, last = middle, count, min(last, max(below, low))
-    k = _counts(n, a, m, c, low)
+    k = _counts(n, rate, low)
     if low_sum < target:
-        growth = _counts(n, a, m, c, high) - k
+        growth = _counts(n, rate, high) - k
         before = np.cumsum(growth, dtype=np.int64) - growth
         k += np.clip(target - low_sum - before, 0, growth).astype(np.int32)
-    return k, low
+    return k
 
 
 def _halfway(low: float, high: float) -> float:
@@ -147,55 +114,46 @@ def _halfway(low: float, high: float) -> float:
 
 
 @njit(inline="always")
-def _at(n: int, a: float, m: float, c: float, t: float) -> int:
-    return int(min(max(np.floor(c + (a + t) * m), 0.0), float(n)))
+def _at(n: int, rate: float, t: float) -> int:
+    return int(min(max(np.floor(t * rate), 0.0), float(n)))
 
 
 @njit(parallel=True, cache=True, error_model="numpy")
-def _count(n: NDArray[np.int32], a: NDArray[np.float64], m: NDArray[np.float64], c: float, t: float) -> int:
+def _count(n: NDArray[np.int32], rate: NDArray[np.float64], t: float) -> int:
     total = 0
-    step = int(len(a) > 1)
     for p in prange(len(n)):
-        total += _at(n[p], a[p * step], m[p], c, t)
+        total += _at(n[p], rate[p], t)
     return total
 
 
 @njit(parallel=True, cache=True, error_model="numpy")
-def _neighbours(
-    n: NDArray[np.int32], a: NDArray[np.float64], m: NDArray[np.float64], c: float, t: float
-) -> tuple[float, float]:
+def _neighbours(n: NDArray[np.int32], rate: NDArray[np.float64], t: float) -> tuple[float, float]:
     # The least number above t at which a count grows, and the greatest below at which one grew.
     above, below = np.inf, -np.inf
-    step = int(len(a) > 1)
     for p in prange(len(n)):
-        offset, rate = a[p * step], m[p]
-        k = _at(n[p], offset, rate, c, t)
-        if rate > 0.0 and k < n[p]:
-            above = min(above, (k + 1 - c) / rate - offset)
-        if rate > 0.0 and k > 0:
-            below = max(below, (k - c) / rate - offset)
+        k = _at(n[p], rate[p], t)
+        if rate[p] > 0.0 and k < n[p]:
+            above = min(above, (k + 1) / rate[p])
+        if rate[p] > 0.0 and k > 0:
+            below = max(below, k / rate[p])
     return above, below
 
 
 @njit(parallel=True, cache=True, error_model="numpy")
-def _counts(
-    n: NDArray[np.int32], a: NDArray[np.float64], m: NDArray[np.float64], c: float, t: float
-) -> NDArray[np.int32]:
+def _counts(n: NDArray[np.int32], rate: NDArray[np.float64], t: float) -> NDArray[np.int32]:
     k = np.empty(len(n), dtype=np.int32)
-    step = int(len(a) > 1)
     for p in prange(len(n)):
-        k[p] = _at(n[p], a[p * step], m[p], c, t)
+        k[p] = _at(n[p], rate[p], t)
     return k
 
 
 @njit(cache=True, error_model="numpy")
-def _bracket(n: NDArray[np.int32], a: NDArray[np.float64], m: NDArray[np.float64], c: float) -> tuple[float, float]:
+def _bracket(n: NDArray[np.int32], rate: NDArray[np.float64]) -> tuple[float, float]:
     # Values of t at which every pixel has its least, and its most; the slack is far above rounding.
     low, high = np.inf, -np.inf
-    step = int(len(a) > 1)
     for p in range(len(n)):
-        if n[p] > 0 and m[p] > 0.0:
-            slack = 1e-9 * (n[p] / m[p] + abs(a[p * step]))
-            low = min(low, (1 - c) / m[p] - a[p * step] - slack)
-            high = max(high, (n[p] - c) / m[p] - a[p * step] + slack)
+        if n[p] > 0 and rate[p] > 0.0:
+            slack = 1e-9 * (n[p] / rate[p])
+            low = min(low, 1 / rate[p] - slack)
+            high = max(high, n[p] / rate[p] + slack)
     return (low, high) if low <= high else (0.0, 0.0)

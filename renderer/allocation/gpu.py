@@ -1,10 +1,10 @@
-"""Whole bins of every pixel from predicted curves, by compute passes: nothing is read back within a frame.
+"""Whole bins of every pixel from predicted prices, by compute passes: nothing is read back within a frame.
 
 `renderer.allocation.cuts` is the same in numpy, and says why it is exact. In order:
 
 - `begin`: fragments that can be in a core, and whether the budget covers them;
-- a predictor fills in the curves of the occupied pixels, unless it does;
-- `place`: a count of fragments by price selects the price that uses the budget, then cuts and their prefix sum.
+- a predictor fills in the ranks of the occupied pixels, unless it does;
+- `place`: a count of fragments by rank selects the rank that uses the budget, then cuts and their prefix sum.
 """
 
 from __future__ import annotations
@@ -14,14 +14,15 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from renderer.allocation.cuts import (
-    DROPPED_BITS,
-    FULL,
-    LEAST_FALL,
+from renderer.allocation.cuts import FULL, MOST_CORE
+from renderer.allocation.prices import (
+    LEAST_ALONE,
+    LEAST_COVERED,
+    LEAST_IMPORTANCE,
     LEAST_PRICE,
-    MOST_CORE,
-    MOST_FALL,
-    MOST_GAIN,
+    LEAST_PRIOR,
+    MOST_ALONE,
+    PRICE_STEPS,
     RANKS,
 )
 from renderer.bin_pass import Binned
@@ -40,10 +41,12 @@ STATE = np.dtype(
 """`allocation/state.glsl`."""
 
 DEFINES: Defines = {
-    **{"BLOCK": BLOCK, "RANKS": RANKS, "LEAST_PRICE": LEAST_PRICE, "DROPPED_BITS": DROPPED_BITS},
-    **{"FULL": FULL, "MOST_CORE": MOST_CORE, "MOST_GAIN": MOST_GAIN, "LEAST_FALL": LEAST_FALL, "MOST_FALL": MOST_FALL},
+    **{"BLOCK": BLOCK, "RANKS": RANKS, "FULL": FULL, "MOST_CORE": MOST_CORE},
+    **{"LEAST_PRICE": LEAST_PRICE, "PRICE_STEPS": PRICE_STEPS, "LEAST_PRIOR": LEAST_PRIOR},
+    **{"LEAST_COVERED": LEAST_COVERED, "LEAST_ALONE": LEAST_ALONE, "MOST_ALONE": MOST_ALONE},
+    **{"LEAST_IMPORTANCE": LEAST_IMPORTANCE},
 }
-"""Of the shaders of an allocation, and of those that write curves, beside those of a tail."""
+"""Of the shaders of an allocation, and of those that write ranks, beside those of a tail."""
 
 _STATE, _BLOCKS = 0, 3
 """Storage bindings of `allocation/*.comp`."""
@@ -100,7 +103,7 @@ class FrameAllocation:
         self._ctx.memory_barrier()
 
     def place(self) -> None:
-        """Select the price, and lay out the pool: a pixel's counts and curve become its core."""
+        """Select the rank, and lay out the pool: a pixel's counts and ranks become its core."""
         self._run("count", self._blocks)
         self._run("choose", 1)
         self._run("blocks", self._blocks)

@@ -1,10 +1,10 @@
 """`kbuffer-deep`: whole bins of every pixel by a bundle's network, run as its own GLSL (METHOD.md 4).
 
-Two geometry passes. The first gathers depth bins and the fragments in each; of those the network predicts every pixel's
-gain curve, and a price is selected that uses the budget (`renderer.allocation.gpu`). So it is known how many of its
-bins are a pixel's core, and how many fragments they have: the second pass appends these and blends the others into the
-tail. Then cores are sorted and resolved. Nothing is read back within a frame, and the picture is the same to the bit
-whatever the order of the fragments, but for the rounding of the tail's sums.
+Two geometry passes. The first gathers depth bins and the fragments in each; of those the network predicts from which
+price on each bin is worth its fragments, and a price is selected that uses the budget (`renderer.allocation.gpu`). So
+it is known how many of its bins are a pixel's core, and how many fragments they have: the second pass appends these and
+blends the others into the tail. Then cores are sorted and resolved. Nothing is read back within a frame, and the
+picture is the same to the bit whatever the order of the fragments, but for the rounding of the tail's sums.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import timing
-from renderer.allocation.cuts import events_of, importance_curve, solve_cuts
+from renderer.allocation.cuts import events_of, solve_cuts
 from renderer.allocation.gpu import DEFINES, FrameAllocation
+from renderer.allocation.prices import gain_prices, importance_prices, prior_gains, ranks_of, shares_of
 from renderer.bin_pass import Binned, word_defines
 from renderer.csr import offsets_of
 from renderer.features import TEXELS, reads_luma
@@ -41,7 +42,7 @@ _GROUP = 64
 _DISPATCH = 65535 * _GROUP
 """Pixels of one dispatch: the least maximum of work groups that GL promises."""
 
-# Storage bindings of kbuffer-deep/*; those of curves.comp are the allocation's.
+# Storage bindings of kbuffer-deep/*; those of prices.comp are the allocation's.
 _PIXELS, _, _POOL, _, _RESULT = range(5)
 
 
@@ -113,16 +114,16 @@ class KBufferDeep:
         )
 
     def _place(self, frame: Frame, binned: Binned, allocation: FrameAllocation, clock: Clock) -> None:
-        """Predict curves and choose cuts on the GPU."""
+        """Predict ranks and choose cuts on the GPU."""
         with clock.measure("predict"):
             allocation.begin()
-            self._predict_curves(frame, binned, allocation)
+            self._predict_ranks(frame, binned, allocation)
         with clock.measure("allocate"):
             allocation.place()
 
-    def _predict_curves(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> None:
+    def _predict_ranks(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> None:
         """Run the network on the occupied pixels."""
-        program = frame.gpu.programs.compute("kbuffer-deep/curves.comp", self._defines, self._texts)
+        program = frame.gpu.programs.compute("kbuffer-deep/prices.comp", self._defines, self._texts)
         self._bind(frame, binned)
         set_uniforms(program, {"width": frame.width})
         allocation.run_pixels(program)
@@ -133,15 +134,34 @@ class KBufferDeep:
             with timing.readback(frame.ctx):
                 counts = binned.counts()
             occupied = np.flatnonzero(counts.any(axis=1)).astype(np.uint32)
-            answers = self._answers(frame, binned, occupied)
+            ranks = self._ranks(binned, occupied, self._answers(frame, binned, occupied))
         with clock.measure("allocate"):
-            is_curve = self.manifest.head == "gain-curve"
-            curve = (answers[:, 0], answers[:, 1]) if is_curve else importance_curve(answers[:, 0])
-            found = solve_cuts(events_of(*curve, counts[occupied]), fragments)
+            found = solve_cuts(events_of(ranks, counts[occupied]), fragments)
             cut, k = np.zeros(frame.pixels, dtype=np.uint32), np.zeros(frame.pixels, dtype=np.int64)
             cut[occupied], k[occupied] = found.cut, found.k
             binned.write_cores(cut, offsets_of(k)[:-1].astype(np.uint32))
         return found.rank is None
+
+    def _ranks(self, binned: Binned, pixels: NDArray[np.uint32], answers: NDArray[np.float32]) -> NDArray[np.uint8]:
+        """Ranks of some pixels' bins, from what the network answers; what `prices.comp` does, in numpy."""
+        counts = binned.counts()[pixels]
+        if self.manifest.head == "importance":
+            return ranks_of(importance_prices(answers[:, 0], counts), counts)
+        prior = prior_gains(*shares_of(binned.kept()[pixels], self._tail), counts, self._tail)
+        return ranks_of(gain_prices(answers, prior), counts)
+
+    def ranks(self, frame: Frame, pixels: NDArray[np.uint32]) -> NDArray[np.uint8]:
+        """Run the network, and rank what it answers.
+
+        Args:
+            frame: The view.
+            pixels: uint32 [M], indices of occupied pixels.
+
+        Returns:
+            uint8 [M, B], of the price from which each bin is in the core (`renderer.allocation.prices`).
+        """
+        binned = self._counted(frame)
+        return self._ranks(binned, pixels, self._answers(frame, binned, pixels))
 
     def predict(self, frame: Frame, pixels: NDArray[np.uint32]) -> NDArray[np.float32]:
         """Run the network.

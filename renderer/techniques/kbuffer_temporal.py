@@ -1,12 +1,12 @@
 """`kbuffer-temporal`: `kbuffer-deep` that learns from its last frame (METHOD.md 4).
 
 A resolved pixel knows what its last core fragment gained: the squared change of its displayed colour when that fragment
-is in the core instead of the tail. In the next frame, the pixel's gain curve `log gain(k) = a - b (k - 1)` is moved
-towards it before the budget is spent, which is met to the fragment as ever. Each pixel remembers in one word the sum of
-its moves, what was seen, and n.
+is in the core instead of the tail. In the next frame, the prices of the pixel's bins are moved by what that was above
+or below the price of its last core bin, before the budget is spent, which is met as ever. Each pixel remembers in one
+word the sum of its moves, what was seen, and n.
 
-- A move is a share of what the curve was wrong by: half of it at first, a third in the next frame, and so on. With a
-  constant share, pixels jump to and fro between two k for ever; so they settle, and a still camera's picture stands
+- A move is a share of what the price was wrong by: half of it at first, a third in the next frame, and so on. With a
+  constant share, pixels jump to and fro between two cuts for ever; so they settle, and a still camera's picture stands
   still once its pixels have learnt from `FRAMES` frames each; one without a core sees nothing in a frame.
 - While the camera moves, a pixel's memory stays at its place in the window. It is forgotten where n is another by more
   than an eighth, and shares do not become smaller than a ninth. Moving memories with the nearest fragments was tried
@@ -29,6 +29,7 @@ import numpy as np
 
 from renderer.allocation.gpu import DEFINES as ALLOCATION_DEFINES
 from renderer.allocation.gpu import FrameAllocation
+from renderer.allocation.prices import PRICE_STEPS
 from renderer.bin_pass import Binned
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene, set_uniforms
@@ -42,14 +43,12 @@ from schemas.view import View
 
 SETTLED: Final = 9
 """Frames of a still camera after which the error hardly falls (docs/TECHNIQUES.md)."""
-CORRECTION_STEPS: Final = 16
-"""Steps of a correction in a unit of log gain: up to 127 of them, 8 units."""
 SEEN_STEPS: Final = 8
 """Steps of a seen log gain in a unit."""
 SEEN_LEAST: Final = -28
 """Log gains below this are taken for it: a change of the colour by 1e-6, the rounding of float32."""
 MOST_WRONG: Final = 3.0
-"""Most of what a curve is wrong by that one frame is believed."""
+"""Most of what a price is wrong by that one frame is believed."""
 FRAMES: Final = 15
 """Frames that correct a pixel of a still camera."""
 MOVING_FRAMES: Final = 7
@@ -62,8 +61,8 @@ MEMORY_BYTES: Final = 4
 """Bytes a pixel, from frame to frame."""
 
 DEFINES: Final[Defines] = {
-    **{"CORRECTION_STEPS": CORRECTION_STEPS, "SEEN_STEPS": SEEN_STEPS, "SEEN_LEAST": SEEN_LEAST, "FRAMES": FRAMES},
-    **{"MOVING_FRAMES": MOVING_FRAMES, "MOST_WRONG": MOST_WRONG},
+    **{"SEEN_STEPS": SEEN_STEPS, "SEEN_LEAST": SEEN_LEAST, "FRAMES": FRAMES},
+    **{"MOVING_FRAMES": MOVING_FRAMES, "MOST_WRONG": MOST_WRONG, "PRICE_STEPS": PRICE_STEPS},
 }
 """Of `kbuffer-temporal/*`."""
 
@@ -111,7 +110,7 @@ class KBufferTemporal(KBufferDeep):
 
     Args:
         bundle: Folder of a bundle; its hashes are verified.
-        inference: As `KBufferDeep` has it; only gain curves that GLSL predicts can be corrected.
+        inference: As `KBufferDeep` has it; only prices that GLSL predicts can be corrected.
 
     Raises:
         Problem: The bundle is damaged or not understood.
@@ -128,12 +127,12 @@ class KBufferTemporal(KBufferDeep):
         """Render the next frame; the first one is that of `kbuffer-deep`.
 
         Raises:
-            Problem: There are no gain curves on the GPU.
+            Problem: There are no prices on the GPU.
         """
-        if self._network is not None or self.manifest.head != "gain-curve":
+        if self._network is not None or self.manifest.head != "bin-gains":
             raise Problem(
-                f"{self.name} corrects gain curves on the GPU, which this bundle or --inference does not leave there.",
-                "Use kbuffer-deep, or a bundle with gain curves and --inference glsl.",
+                f"{self.name} corrects prices of bins on the GPU, which this bundle or --inference does not leave.",
+                "Use kbuffer-deep, or a bundle of the head bin-gains and --inference glsl.",
                 ExitCode.LIMIT,
             )
         past, self._past = self._past, None
@@ -152,9 +151,9 @@ class KBufferTemporal(KBufferDeep):
             early_bytes=rendered.early_bytes + MEMORY_BYTES,
         )
 
-    def _predict_curves(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> None:
+    def _predict_ranks(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> None:
         """What the network predicts, corrected by what was seen of the last frame."""
-        super()._predict_curves(frame, binned, allocation)
+        super()._predict_ranks(frame, binned, allocation)
         assert self._memory is not None, "render is before"
         defines = {**ALLOCATION_DEFINES, **DEFINES, **binned.defines}
         program = frame.gpu.programs.compute("kbuffer-temporal/correct.comp", defines)

@@ -113,15 +113,12 @@ BOUNDS: Final[dict[str, Bound]] = {
         "How much later, on the scale of `t`, a fragment that was given comes than one that was not, against sorted "
         "float64 thresholds. Fills bracket `t` down to neighbouring float64 numbers.",
     ),
-    "fill.lambda": Bound(
-        1e-12, "relative", 1.0, "The same with `t = -log lambda`; relative to the largest `|a| + n b` of the view."
-    ),
     "fill.cuts": Bound(
         1.01,
         "absolute",
         1.0,
-        "The same for whole bins, in ranks of prices, rounded as compute passes have them: what comes at one rank is "
-        "handed out by pixel index. The hundredth is for prices in float32.",
+        "The same for whole bins, in ranks of prices, as compute passes have them: what comes at one rank is handed "
+        "out by pixel index. The hundredth is for prices in float32.",
     ),
     "fill.order": Bound(
         0.0,
@@ -177,12 +174,12 @@ BOUNDS: Final[dict[str, Bound]] = {
     "predict.torch": Bound(1e-5, "relative", 1.0, "The same in torch."),
     "predict.onnx": Bound(1e-5, "relative", 1.0, "The same in onnxruntime, as the renderer runs it."),
     "predict.search": Bound(1e-5, "relative", 1.0, "The same for the worst features that a search finds."),
-    "predict.counts": Bound(
+    "predict.ranks": Bound(
         1.0,
         "absolute",
         1.0,
-        "Fragments by which a pixel's count differs between float64 and a float32 form: where `floor` is at a step "
-        "it may be one.",
+        "By how much the rank of a bin differs between float64 and a float32 form: where `floor` is at a step, it may "
+        "be one.",
     ),
     "refused.arrays": Bound(
         0.0, "absolute", 1.0, "Arrays with NaN or infinity that are not refused with a clear error."

@@ -10,19 +10,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from labeller.curves import Curves
-from renderer.allocation.cuts import (
-    DROPPED_BITS,
-    FULL,
-    LEAST_PRICE,
-    MOST_CORE,
-    RANKS,
-    Cuts,
-    Events,
-    events_of,
-    solve_cuts,
-    within_limits,
-)
-from renderer.allocation.fill import budget_fill, solve_lambda
+from renderer.allocation.cuts import FULL, MOST_CORE, Cuts, Events, events_of, solve_cuts
+from renderer.allocation.fill import budget_fill
+from renderer.allocation.prices import LEAST_PRICE, PRICE_STEPS, RANKS, ranks_of
 from schemas.tail import DENSITY_G
 from services.stress.allocations import edge_budgets
 from services.stress.bounds import counted, within
@@ -34,7 +24,7 @@ Numbers = NDArray[np.float32]
 
 
 def run(options: Options) -> Iterator[Finding]:
-    """Both fills and whole bins at every edge budget, then the sums."""
+    """Fills and whole bins at every edge budget, then the sums."""
     rng = np.random.default_rng(options.seed)
     pixels = 300 if options.quick else 2000
     n = np.where(rng.random(pixels) < 0.02, 4096, rng.integers(0, 7, pixels)).astype(np.int32)
@@ -43,10 +33,6 @@ def run(options: Options) -> Iterator[Finding]:
         found = [(f, budget_fill(weights, n, f)) for f in edge_budgets(n)]
         limits.append(_limits(f"weights {name}", n, found))
         yield _order_of_weights(name, n, weights, found)
-    for name, (a, b) in gain_cases(rng, pixels).items():
-        found = [(f, solve_lambda(a, b, n, f)[0]) for f in edge_budgets(n)]
-        limits.append(_limits(f"gains {name}", n, found))
-        yield _order_of_gains(name, n, a, b, found)
     yield worst_of(limits, f"{len(limits)} inputs, every F")
     yield from _whole_bins(rng, pixels)
     yield from _sums(rng, 100_000 if options.quick else 10_000_000)
@@ -68,30 +54,23 @@ def weight_cases(rng: np.random.Generator, pixels: int) -> dict[str, Numbers]:
     }
 
 
-def gain_cases(rng: np.random.Generator, pixels: int) -> dict[str, tuple[Numbers, Numbers]]:
-    """Gain curves a and b of all kinds, float32 [P] each."""
+def price_cases(rng: np.random.Generator, pixels: int, bins: int) -> dict[str, Numbers]:
+    """Prices of bins of all kinds, float32 [P, bins], in any order; such as a network that overflows answers, too."""
+    shape = (pixels, bins)
+    usual = rng.normal(8.0, 6.0, shape)
+    bad = rng.choice([np.nan, np.inf, -np.inf, 0.0], shape)
     cases = {
-        "random": (rng.normal(-8.0, 3.0, pixels), rng.uniform(0.02, 2.0, pixels)),
-        "all equal": (np.full(pixels, -8.0), np.full(pixels, 0.5)),
-        "least b": (rng.normal(-8.0, 3.0, pixels), np.full(pixels, 0.02)),
-        "huge a": (rng.choice([-1e30, 1e30], pixels), rng.uniform(0.02, 2.0, pixels)),
-        "huge b": (rng.normal(-8.0, 3.0, pixels), rng.choice([0.02, 1e30], pixels)),
-        "1 ulp apart": (-8.0 + rng.integers(0, 3, pixels) * 2.0**-20, np.full(pixels, 0.25)),
+        "random": usual,
+        "rising": np.sort(usual, axis=1),
+        "falling": -np.sort(-usual, axis=1),
+        "all equal": np.full(shape, 8.0),
+        "halfway between two ranks, 1 ulp apart": (rng.integers(0, 40, shape) + 0.5) / PRICE_STEPS
+        + rng.integers(-1, 2, shape) * 2.0**-21,
+        "huge": rng.choice([-1e30, 1e30], shape),
+        "all NaN": np.full(shape, np.nan),
+        "NaN or infinite": np.where(bad == 0.0, usual, bad),
     }
-    return {name: (a.astype(np.float32), b.astype(np.float32)) for name, (a, b) in cases.items()}
-
-
-def overflow_cases(rng: np.random.Generator, pixels: int) -> dict[str, tuple[Numbers, Numbers]]:
-    """What a network that overflows may answer, float32 [P] each; a frame cannot refuse it."""
-    a, b = rng.normal(-8.0, 3.0, pixels), rng.uniform(0.02, 2.0, pixels)
-    bad = rng.choice([np.nan, np.inf, -np.inf, 0.0], pixels)
-    cases = {
-        "all NaN": (np.full(pixels, np.nan), np.full(pixels, np.nan)),
-        "a NaN or infinite": (np.where(bad == 0.0, a, bad), b),
-        "b NaN or infinite": (a, np.where(bad == 0.0, b, np.abs(bad))),
-        "both": (np.where(bad == 0.0, a, bad), np.where(rng.random(pixels) < 0.5, b, np.abs(bad + 0.02))),
-    }
-    return {name: (a.astype(np.float32), b.astype(np.float32)) for name, (a, b) in cases.items()}
+    return {name: prices.astype(np.float32) for name, prices in cases.items()}
 
 
 def _limits(name: str, n: Counts, found: list[tuple[int, Counts]]) -> Finding:
@@ -117,29 +96,15 @@ def _order_of_weights(name: str, n: Counts, weights: Numbers, found: list[tuple[
     return within("fill.budget", name, np.array(late), np.zeros(len(late)), places)
 
 
-def _order_of_gains(name: str, n: Counts, a: Numbers, b: Numbers, found: list[tuple[int, Counts]]) -> Finding:
-    """A pixel's j-th fragment comes at the price `a - (j - 1.5) b`: what was given must not be below what was not."""
-    gain, decay = a.astype(np.float64), b.astype(np.float64)
-    late, places = [], []
-    for budget, k in found:
-        given, missing = k > 0, k < n
-        lowest = (gain - (k - 1.5) * decay)[given].min(initial=math.inf)
-        highest = (gain - (k - 0.5) * decay)[missing].max(initial=-math.inf)
-        scale = float((np.abs(gain) + n * decay).max())
-        late.append(max((highest - lowest) / scale, 0.0))
-        places.append(f"F {budget}")
-    return within("fill.lambda", name, np.array(late), np.zeros(len(late)), places)
-
-
 def _whole_bins(rng: np.random.Generator, pixels: int) -> Iterator[Finding]:
     """Cuts at every edge budget: limits, and the order in which bins are granted."""
     counts = bin_counts(rng, pixels)
     n, limits = whole_bins(counts), []
-    for name, (a, b) in (gain_cases(rng, pixels) | overflow_cases(rng, pixels)).items():
-        events = events_of(a, b, counts)
+    for name, prices in price_cases(rng, *counts.shape).items():
+        events = events_of(ranks_of(prices, counts), counts)
         found = [(f, solve_cuts(events, f)) for f in edge_budgets(n.sum(axis=1))]
         limits.append(_cut_limits(name, n, events, found))
-        yield _order_of_bins(name, n, *within_limits(a, b), found)
+        yield _order_of_bins(name, n, exact_ranks(prices, counts), found)
     yield worst_of(limits, f"{len(limits)} inputs, every F")
 
 
@@ -177,13 +142,13 @@ def _cut_limits(name: str, n: NDArray[np.int64], events: Events, found: list[tup
             count += int(left >= n[first & (events.rank == rank)].max())
         if count:
             wrong, where = wrong + count, f"F {budget}"
-    return counted("fill.limits", f"cuts, gains {name}", wrong, where)
+    return counted("fill.limits", f"cuts, prices {name}", wrong, where)
 
 
-def _order_of_bins(name: str, n: NDArray[np.int64], a: Numbers, b: Numbers, found: list[tuple[int, Cuts]]) -> Finding:
-    """A bin comes at the rank of the price where the middle of its fragments does: by how many ranks it is late."""
-    gain, fall, after = a.astype(np.float64)[:, None], b.astype(np.float64)[:, None], np.cumsum(n, axis=1)
-    rank = exact_rank(fall * (after - n / 2.0 - 1.0) - gain)
+def _order_of_bins(
+    name: str, n: NDArray[np.int64], rank: NDArray[np.float64], found: list[tuple[int, Cuts]]
+) -> Finding:
+    """A bin comes at the price of it and of those in front of it: by how many ranks it is late."""
     late, places = [], []
     for budget, cuts in found:
         inside = np.arange(n.shape[1]) < cuts.cut[:, None]
@@ -193,11 +158,16 @@ def _order_of_bins(name: str, n: NDArray[np.int64], a: Numbers, b: Numbers, foun
     return within("fill.cuts", name, np.array(late), np.zeros(len(late)), places)
 
 
-def exact_rank(price: NDArray[np.float64]) -> NDArray[np.float64]:
-    """`renderer.allocation.cuts.rank_of` before it is rounded down: linear between the powers of two."""
-    fraction, exponent = np.frexp(np.maximum(price - LEAST_PRICE, 1.0))
-    per_octave = 2.0 ** (23 - DROPPED_BITS)
-    return np.minimum((exponent - 1 + 2.0 * fraction - 1.0) * per_octave, RANKS - 1.0)
+def exact_ranks(prices: Numbers, counts: NDArray[np.integer]) -> NDArray[np.float64]:
+    """`renderer.allocation.prices.ranks_of` before it is rounded down, in plain Python."""
+    ranks = np.zeros(prices.shape)
+    for row, own, out in zip(prices.tolist(), counts.tolist(), ranks, strict=True):
+        most = 0.0
+        for b, price in enumerate(row):
+            here = RANKS - 1.0 if math.isnan(price) else (price - LEAST_PRICE) * PRICE_STEPS + 0.5
+            most = max(most, min(here, RANKS - 1.0)) if own[b] else most
+            out[b] = most
+    return ranks
 
 
 def _sums(rng: np.random.Generator, count: int) -> Iterator[Finding]:

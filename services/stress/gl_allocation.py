@@ -9,13 +9,14 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.allocation.cuts import Cuts, events_of, solve_cuts, within_limits
+from renderer.allocation.cuts import Cuts, events_of, solve_cuts
 from renderer.allocation.gpu import BLOCK, FrameAllocation
+from renderer.allocation.prices import ranks_of
 from renderer.bin_pass import CORE_WORDS, CURSOR_BITS, Binned
 from renderer.programs import Programs
 from schemas.tail import BINNED_TAILS, TAILS, TailName
 from services.stress.allocations import edge_budgets
-from services.stress.fills import bin_counts, gain_cases, overflow_cases, whole_bins
+from services.stress.fills import bin_counts, price_cases, whole_bins
 from services.stress.findings import Finding, Options, compared
 from services.stress.gl_bounds import bound_of
 
@@ -23,7 +24,7 @@ PATH = "allocation"
 
 
 def rows(ctx: moderngl.Context, options: Options, driver: str) -> Iterator[Finding]:
-    """All kinds of gain curves and counts at every edge budget.
+    """All kinds of prices and counts at every edge budget.
 
     Args:
         ctx: The context.
@@ -36,13 +37,14 @@ def rows(ctx: moderngl.Context, options: Options, driver: str) -> Iterator[Findi
     for tail in BINNED_TAILS:
         counts = bin_counts(rng, pixels, TAILS[tail].bins)
         n = whole_bins(counts).sum(axis=1)
-        for name, curve in (gain_cases(rng, pixels) | overflow_cases(rng, pixels)).items():
-            events, limited = events_of(*curve, counts), np.stack(within_limits(*curve), axis=1)
+        for name, prices in price_cases(rng, *counts.shape).items():
+            ranks = ranks_of(prices, counts)
+            events = events_of(ranks, counts)
             for budget in {*edge_budgets(n), 1}:
                 truth = solve_cuts(events, budget)
-                found = _placed(ctx, programs, tail, limited, counts, budget, truth)
+                found = _placed(ctx, programs, tail, ranks, counts, budget, truth)
                 expected = np.stack([truth.cut, np.zeros(pixels)], axis=1)
-                row = compared(path, "gain curves", found, expected, bound.value, bound.measure, bound.floor)
+                row = compared(path, "ranks", found, expected, bound.value, bound.measure, bound.floor)
                 yield replace(row, where=f"{tail}, {name}, F {budget}, {row.where}")
 
 
@@ -50,13 +52,13 @@ def _placed(
     ctx: moderngl.Context,
     programs: Programs,
     tail: TailName,
-    curves: NDArray[np.float32],
+    ranks: NDArray[np.uint8],
     counts: NDArray[np.uint8],
     budget: int,
     truth: Cuts,
 ) -> NDArray[np.float64]:
     """float64 [P, 2], the cut of every pixel, and the fragments of the true one that its run has no room for."""
-    binned = packed_bins(ctx, tail, counts, curves)
+    binned = packed_bins(ctx, tail, counts, ranks)
     allocation = FrameAllocation(ctx, programs, binned, len(counts), budget)
     allocation.begin()
     allocation.place()
@@ -65,22 +67,19 @@ def _placed(
     return np.stack([cut, np.maximum(truth.k - room, 0)], axis=1).astype(np.float64)
 
 
-def packed_bins(
-    ctx: moderngl.Context, tail: TailName, counts: NDArray[np.uint8], curves: NDArray[np.float32]
-) -> Binned:
+def packed_bins(ctx: moderngl.Context, tail: TailName, counts: NDArray[np.uint8], ranks: NDArray[np.uint8]) -> Binned:
     """A pixel's words as packing and predicting leave them.
 
     Args:
         ctx: The context.
         tail: A tail with bins.
         counts: uint8 [P, B], fragments of the bins.
-        curves: float32 [P, 2], a and b.
+        ranks: uint8 [P, B], of their prices.
     """
     bins = TAILS[tail].bins
     words = np.zeros((len(counts), bins), dtype=np.uint32)
-    words[:, bins // 2 : bins // 2 + bins // 4] = np.ascontiguousarray(counts, dtype=np.uint8).view(np.uint32)
-    first = bins // 2 + bins // 4
-    words[:, first : first + 2] = np.ascontiguousarray(curves, dtype=np.float32).view(np.uint32)
+    both = np.concatenate([counts, ranks], axis=1, dtype=np.uint8)
+    words[:, bins // 2 :] = both.view(np.uint32)
     return Binned(tail, TAILS[tail], ctx.buffer(words), len(counts), ctx.buffer(reserve=8))
 
 

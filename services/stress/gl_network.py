@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from renderer.features import FEATURES, SUMS, derive
 from renderer.techniques import KBufferDeep
-from schemas.bundle import GLSL, MANIFEST, ParityReport, Provenance, TailSpec, file_spec, load_manifest
-from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, DENSITY_G, TailName
+from schemas.bundle import GLSL, MANIFEST, ParityReport, Provenance, TailSpec, file_spec, gain_outputs, load_manifest
+from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, DENSITY_G, TAILS, TailName
 from services.stress.features import FRONTS, KEPT, SPREADS, in_steps
 from services.stress.findings import Finding, Options, compared
 from services.stress.gl_bins import Judge, counted_bins
@@ -53,13 +53,21 @@ def random_networks(folder: Path, weights: Weights, driver: str) -> Networks:
     """Bundles of a network. Its forms are not compared here: that is what the suites do."""
     bundles, overflowing = {tail: folder / tail for tail in BINNED_TAILS}, folder / "overflowing"
     for tail, path in bundles.items():
-        _bundle(path, weights, tail, driver)
-    _bundle(overflowing, weights, DEFAULT_TAIL, driver)
-    (overflowing / GLSL).write_text(shader_source(overflowed(weights)), encoding="utf-8")
+        _bundle(path, narrowed(weights, tail), tail, driver)
+    narrow = narrowed(weights, DEFAULT_TAIL)
+    _bundle(overflowing, narrow, DEFAULT_TAIL, driver)
+    (overflowing / GLSL).write_text(shader_source(overflowed(narrow)), encoding="utf-8")
     manifest = load_manifest(bundles[DEFAULT_TAIL])
     manifest = manifest.model_copy(update={"files": {**manifest.files, GLSL: file_spec(overflowing / GLSL)}})
     (overflowing / MANIFEST).write_text(manifest.model_dump_json(), encoding="utf-8")
     return Networks(weights, bundles, overflowing)
+
+
+def narrowed(weights: Weights, tail: TailName) -> Weights:
+    """A network that answers for the bins of a tail, and no others."""
+    outputs, (weight, bias) = gain_outputs(TAILS[tail].bins), weights.layers[-1]
+    rows = [weights.outputs.index(name) for name in outputs]
+    return replace(weights, layers=(*weights.layers[:-1], (weight[rows], bias[rows])), outputs=outputs)
 
 
 def overflowed(weights: Weights) -> Weights:
@@ -89,7 +97,7 @@ def rows(case: Case, networks: Networks, driver: str) -> Iterator[Finding]:
         truth = sums64(dump, tail)[judge.pixels]
         # Fragments are what the counts of the bins, which have an end, say.
         truth[:, SUMS.index("n")] = counted_bins(case, judge.pixels, tail).sum(axis=1)
-        yield from _features(judge, networks.weights, KBufferDeep(bundle), tail, truth)
+        yield from _features(judge, narrowed(networks.weights, tail), KBufferDeep(bundle), tail, truth)
 
 
 def _features(
@@ -114,7 +122,7 @@ def _outputs(
     expected: NDArray[np.float64],
 ) -> Iterator[Finding]:
     """The network of the features that the GPU has, and of those that it should have."""
-    names = ["a", "b"]
+    names = list(weights.outputs)
     yield judge.row("predict.glsl", predicted, predicted64(weights, features), names)
     ideal = network64(weights.mean, weights.std, weights.layers, expected)
     yield judge.row("predict.features", predicted, ideal, names)
@@ -138,7 +146,7 @@ def feature_rows(
             path = Path(folder) / GLSL
             path.write_text(shader_source(weights), encoding="utf-8")
             for case, inputs in feature_cases(rng, weights, real).items():
-                found, truth = glsl_outputs(path, inputs, ctx), predicted64(weights, inputs)
+                found, truth = glsl_outputs(path, inputs, ctx, len(weights.outputs)), predicted64(weights, inputs)
                 row = compared(
                     f"predict.glsl · {driver}",
                     "adverse features",

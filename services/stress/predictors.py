@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.allocation.fill import solve_lambda
+from renderer.allocation.prices import gain_prices, ranks_of
 from renderer.features import FEATURES, derive, gather
-from schemas.bundle import FEATURE_LIMIT, ONNX
+from schemas.bundle import FEATURE_LIMIT, ONNX, gain_outputs
+from schemas.tail import TAILS
 from services.stress.bounds import counted, within
 from services.stress.cases import random_dump
 from services.stress.features import EVERY
@@ -31,12 +32,15 @@ if TYPE_CHECKING:
 Rows = NDArray[np.float32]
 Predict = Callable[[Rows], Rows]
 
+OUTPUTS: Final = gain_outputs(TAILS[EVERY].bins)
+"""Of the networks here; a tail of fewer bins reads fewer."""
+
 NEEDED: Final = {"predict.numpy": (), "predict.torch": ("torch", "moderngl"), "predict.onnx": ("onnx", "onnxruntime")}
 """Form of the network -> libraries without which it is not run here."""
 
 
 def run(options: Options) -> Iterator[Row]:
-    """All forms that are installed, on the same inputs; then counts, and float16."""
+    """All forms that are installed, on the same inputs; then ranks, and float16."""
     rng = np.random.default_rng(options.seed)
     real = real_features(rng, 500 if options.quick else 20_000)
     for number, (name, weights) in enumerate(networks(options.seed, real).items()):
@@ -50,12 +54,12 @@ def run(options: Options) -> Iterator[Row]:
             cases = feature_cases(rng, weights, real)
             found = [_compared(path, case, predict, weights, inputs) for case, inputs in cases.items()]
             yield worst_of(found, f"{name}, {len(found)} kinds of inputs")
-            yield _counts(path, name, predict, weights, real, rng)
+            yield _ranks(path, name, predict, weights, real, rng)
         yield from _float16(name, weights, real, rng)
 
 
 def form(path: str, weights: Weights, folder: Path) -> Predict | NotRun:
-    """One form of the network: float32 [R, F] to float32 [R, 2]; or why there is none here.
+    """One form of the network: float32 [R, F] to float32 [R, outputs]; or why there is none here.
 
     Args:
         path: A key of `NEEDED`.
@@ -81,11 +85,11 @@ def form(path: str, weights: Weights, folder: Path) -> Predict | NotRun:
 
 def _in_numpy(weights: Weights, inputs: Rows) -> Rows:
     with np.errstate(over="ignore"):  # what overflows when it is divided by the spread is clamped
-        return np.stack(weights.predict(inputs), axis=1)
+        return weights.run(inputs)
 
 
 def predicted64(weights: Weights, inputs: Rows) -> NDArray[np.float64]:
-    """float64 [R, 2], what the network answers to float32 [R, F]."""
+    """float64 [R, outputs], what the network answers to float32 [R, F]."""
     return network64(weights.mean, weights.std, weights.layers, inputs[:, weights.columns])
 
 
@@ -107,21 +111,22 @@ def networks(seed: int, real: Rows) -> dict[str, Weights]:
     made = {}
     for name, hidden, least in (("32-16", (32, 16), 1e-2), ("64-64-64, features of spread 1e-4", (64, 64, 64), 1e-4)):
         rng = np.random.default_rng(seed)
-        layers = random_layers(rng, hidden)
+        layers = random_layers(rng, hidden, len(OUTPUTS))
         std = real.std(axis=0) if least == 1e-2 else np.full(len(FEATURES), least)
         std = np.maximum(std, least).astype(np.float32)
-        made[name] = Weights(FEATURES, real.mean(axis=0).astype(np.float32), std, layers)
+        made[name] = Weights(FEATURES, real.mean(axis=0).astype(np.float32), std, layers, "bin-gains", OUTPUTS)
     return made
 
 
-def random_layers(rng: np.random.Generator, hidden: tuple[int, ...]) -> tuple[tuple[Rows, Rows], ...]:
+def random_layers(rng: np.random.Generator, hidden: tuple[int, ...], outputs: int) -> tuple[tuple[Rows, Rows], ...]:
     """Weights and biases of the size that training gives, float32.
 
     Args:
         rng: Draws them.
         hidden: Units of the hidden layers.
+        outputs: Numbers of an answer: gains of bins, and how much the prior counts.
     """
-    sizes = (len(FEATURES), *hidden, 2)
+    sizes = (len(FEATURES), *hidden, outputs)
     layers = [
         (
             rng.normal(0.0, 1.5 / math.sqrt(fan_in), (fan_out, fan_in)).astype(np.float32),
@@ -129,7 +134,7 @@ def random_layers(rng: np.random.Generator, hidden: tuple[int, ...]) -> tuple[tu
         )
         for fan_in, fan_out in pairwise(sizes)
     ]
-    layers[-1][1][0] = -8.0
+    layers[-1][1][:-1] -= 4.0
     return tuple(layers)
 
 
@@ -157,29 +162,29 @@ def _compared(path: str, case: str, predict: Predict, weights: Weights, inputs: 
     return within(path, case, predict(inputs), predicted64(weights, inputs), places)
 
 
-def _counts(path: str, name: str, predict: Predict, weights: Weights, real: Rows, rng: np.random.Generator) -> Finding:
-    """Counts of float32 predictions against those of float64 ones, at one budget."""
-    difference, changed = _count_difference(predict(real).astype(np.float64), predicted64(weights, real), rng)
-    return counted("predict.counts", f"{path}, {name}", difference, f"{changed} of {len(real)} pixels change")
+def _ranks(path: str, name: str, predict: Predict, weights: Weights, real: Rows, rng: np.random.Generator) -> Finding:
+    """Ranks of float32 predictions against those of float64 ones."""
+    difference, changed = _rank_difference(predict(real), predicted64(weights, real), rng)
+    return counted("predict.ranks", f"{path}, {name}", difference, f"{changed} of {len(real)} pixels change")
 
 
-def _count_difference(
-    found: NDArray[np.float64], truth: NDArray[np.float64], rng: np.random.Generator
+def _rank_difference(
+    found: NDArray[np.floating], truth: NDArray[np.float64], rng: np.random.Generator
 ) -> tuple[int, int]:
-    """Largest difference of a pixel's count between two predictions at the same budget, and how many differ."""
-    n = rng.integers(1, 40, len(truth))
-    budget = int(0.4 * n.sum())
-    k, _ = solve_lambda(found[:, 0], found[:, 1], n, budget)
-    expected, _ = solve_lambda(truth[:, 0], truth[:, 1], n, budget)
-    return int(np.abs(k - expected).max()), int((k != expected).sum())
+    """Largest difference of a bin's rank between two predictions, and how many pixels have one."""
+    counts = rng.integers(0, 4, (len(truth), truth.shape[1] - 1))
+    prior = rng.uniform(-12.0, 0.0, counts.shape).astype(np.float32)
+    ranks = (ranks_of(gain_prices(answers.astype(np.float32), prior), counts) for answers in (found, truth))
+    apart = np.abs(np.subtract(*(rank.astype(np.int64) for rank in ranks)))
+    return int(apart.max()), int(apart.any(axis=1).sum())
 
 
 def _float16(name: str, weights: Weights, real: Rows, rng: np.random.Generator) -> Iterator[Finding]:
-    """What a network answers to features that were stored as float16, and the counts that follow."""
+    """What a network answers to features that were stored as float16, and the ranks that follow."""
     rounded = real.astype(np.float16).astype(np.float32)
     truth, found = predicted64(weights, real), predicted64(weights, rounded)
     places = [f"row {row}" for row in range(len(real))]
-    yield within("features.float16", f"{name}: a and b", found, truth, places)
-    difference, changed = _count_difference(found, truth, rng)
+    yield within("features.float16", f"{name}: answers", found, truth, places)
+    difference, changed = _rank_difference(found, truth, rng)
     share = f"{changed} of {len(real)} pixels change"
-    yield counted("features.float16", f"{name}: fragments of a pixel", difference, share)
+    yield counted("features.float16", f"{name}: rank of a bin", difference, share)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import tempfile
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -15,14 +13,14 @@ from numpy.typing import ArrayLike
 
 import labeller
 from labeller.curves import composite, error_curves
-from renderer.allocation.fill import budget_fill, paper_fill, solve_lambda
+from renderer.allocation.fill import budget_fill, paper_fill
 from renderer.features import gather
 from schemas.problem import Problem
 from services.stress.bounds import counted
 from services.stress.cases import dump_of, some_list
 from services.stress.features import EVERY
-from services.stress.findings import Finding, NotRun, Options, Row, worst_of
-from services.stress.predictors import form, networks, real_features
+from services.stress.findings import Finding, Options, Row, worst_of
+from services.stress.predictors import networks, real_features
 
 PATH: Final = "refused.arrays"
 _WORDS: Final = ("finite", "positive", "NaN", "numbers")
@@ -50,8 +48,6 @@ def run(options: Options) -> Iterator[Row]:
             "weight, error_curves": partial(error_curves, dump, weights=wrong),
             "weight, budget_fill": partial(budget_fill, wrong, n, 12),
             "weight, paper_fill": partial(paper_fill, wrong, 12),
-            "a, solve_lambda": partial(solve_lambda, wrong, some, n, 12),
-            "b, solve_lambda": partial(solve_lambda, some, wrong, n, 12),
         }
         for case, call in calls.items():
             rows.setdefault(case, []).append(_refusal(name, call))
@@ -61,21 +57,10 @@ def run(options: Options) -> Iterator[Row]:
 
 
 def _networks(options: Options) -> Iterator[Row]:
-    """Networks answer NaN with NaN, which the fill then refuses; one with a weight that is NaN is not exported."""
+    """A network with a weight that is NaN is not exported. What one answers to NaN is ranked last, and not refused."""
     from trainer.export_shader import shader_source
 
-    real = real_features(np.random.default_rng(options.seed), 64)
-    weights = next(iter(networks(options.seed, real).values()))
-    damaged = real.copy()
-    damaged[7, 3] = np.nan
-    n = np.full(len(real), 5)
-    with tempfile.TemporaryDirectory() as folder:
-        for path in ("predict.numpy", "predict.torch", "predict.onnx"):
-            predict = form(path, weights, Path(folder))
-            if isinstance(predict, NotRun):
-                continue  # said by the suite of the networks
-            gain = predict(damaged).astype(np.float64)
-            yield _refusal(f"NaN as feature, {path}", partial(solve_lambda, gain[:, 0], gain[:, 1], n, 100))
+    weights = next(iter(networks(options.seed, real_features(np.random.default_rng(options.seed), 64)).values()))
     weights.layers[0][0][0, 0] = np.nan
     yield _refusal("NaN as weight of a network, GLSL", partial(shader_source, weights))
 

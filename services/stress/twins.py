@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from labeller.reference import Pixel, binned_exponents, depth_bins, pixel_of
 from renderer.features import FEATURES, SUMS
-from schemas.bundle import FEATURE_LIMIT, GAIN_FLOOR
+from schemas.bundle import FEATURE_LIMIT
 from schemas.fragments import FragmentDump
 from schemas.tail import (
     LUMA,
@@ -171,7 +171,7 @@ def network64(
     layers: Sequence[tuple[NDArray[np.float32], NDArray[np.float32]]],
     features: NDArray[np.floating],
 ) -> NDArray[np.float64]:
-    """The gain-curve network in float64.
+    """A network of the head `bin-gains` in float64.
 
     Args:
         mean: [F], of the inputs.
@@ -180,7 +180,7 @@ def network64(
         features: [R, F], in the order of the network's inputs.
 
     Returns:
-        float64 [R, 2], a and b.
+        float64 [R, B+1], what it adds to the prior of each bin, and how much that counts.
     """
     x = (features.astype(np.float64) - mean.astype(np.float64)) / std.astype(np.float64)
     x = np.clip(x, -FEATURE_LIMIT, FEATURE_LIMIT)
@@ -188,5 +188,5 @@ def network64(
         x = np.maximum(x @ weight.astype(np.float64).T + bias.astype(np.float64), 0.0)
     weight, bias = layers[-1]
     out = x @ weight.astype(np.float64).T + bias.astype(np.float64)
-    softplus = np.maximum(out[:, 1], 0.0) + np.log1p(np.exp(-np.abs(out[:, 1])))
-    return np.stack([out[:, 0], softplus + GAIN_FLOOR], axis=1)
+    prior = np.maximum(out[:, -1:], 0.0) + np.log1p(np.exp(-np.abs(out[:, -1:])))
+    return np.concatenate([out[:, :-1], prior], axis=1)

@@ -15,9 +15,10 @@ from schemas.bundle import (
     SelfTest,
     TailSpec,
     file_spec,
+    gain_outputs,
     layer_specs,
 )
-from schemas.tail import DEFAULT_TAIL
+from schemas.tail import DEFAULT_TAIL, TAILS
 
 TOLERANCE = 1e-4
 
@@ -42,18 +43,25 @@ def make_bundle(
     folder.mkdir(parents=True)
     for name in FILES:
         (folder / name).write_text(f"{name} {weights}")
+    outputs = gain_outputs(TAILS[DEFAULT_TAIL].bins)
     manifest = Manifest(
         name="glass",
-        outputs=("a", "b"),
+        outputs=outputs,
         features=(FeatureSpec(name="count", mean=0.0, std=1.0),),
         hidden=(4,),
-        layers=layer_specs(1, (4,)),
+        layers=layer_specs(1, (4,), len(outputs)),
         tail=TailSpec(name=DEFAULT_TAIL, g=0.75),
         metric="display",
         files={name: file_spec(folder / name) for name in FILES},
         onnx=OnnxSpec(opset=17, ir_version=8),
         self_test=SelfTest(
-            features=(), outputs=(), sums=(), derived=(), tolerance={}, feature_tolerance=1e-4, output_scale=(1.0, 1.0)
+            features=(),
+            outputs=(),
+            sums=(),
+            derived=(),
+            tolerance={},
+            feature_tolerance=1e-4,
+            output_scale=(1.0,) * len(outputs),
         ),
         parity=ParityReport(
             count=10, tolerance=TOLERANCE, torch_onnx=1e-7, torch_glsl=parity, torch_ubo=0.0, driver="llvmpipe"

@@ -14,20 +14,22 @@ from numpy.typing import NDArray
 from labeller.curves import error_curves, whole_bins
 from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
+from renderer.depth_bins import bin_counts
 from renderer.features import FEATURES, derive, gather
 from schemas.bundle import (
     GLSL,
+    HEADS,
     MANIFEST,
     FeatureSpec,
     HeadName,
-    OutputName,
     Provenance,
     TailSpec,
     file_spec,
+    gain_outputs,
     layer_specs,
     load_manifest,
 )
-from schemas.tail import DEFAULT_TAIL, TailName
+from schemas.tail import DEFAULT_TAIL, TAILS, TailName
 from support.bundles import make_bundle
 from support.dumps import random_dump
 from trainer.bundle import Description, export_bundle
@@ -52,6 +54,8 @@ def random_view(asset: str, seed: int, size: int = 40, max_n: int = 12) -> ViewD
         asset,
         features=derive(gather(dump, DEFAULT_TAIL))[rows],
         n=dump.counts[rows].astype(np.int32),
+        tail=DEFAULT_TAIL,
+        bin_counts=bin_counts(dump, DEFAULT_TAIL)[rows, : TAILS[DEFAULT_TAIL].bins],
         hull=(offsets, hulls.k[vertices], hulls.error[vertices]),
         price_range=(min(prices) - 1.0, max(prices) + 1.0),
         anchors=prices,
@@ -70,11 +74,12 @@ def random_weights(
     seed: int,
     features: tuple[str, ...] = FEATURES,
     hidden: tuple[int, ...] = (32, 16),
-    head: HeadName = "gain-curve",
-    outputs: tuple[OutputName, ...] = ("a", "b"),
+    head: HeadName = "bin-gains",
+    tail: TailName = DEFAULT_TAIL,
 ) -> Weights:
     """A network whose outputs have the size that trained ones have."""
     rng = np.random.default_rng(seed)
+    outputs = gain_outputs(TAILS[tail].bins) if head == "bin-gains" else HEADS[head][0]
     sizes = (len(features), *hidden, len(outputs))
     layers: list[Layer] = [
         (
@@ -83,8 +88,8 @@ def random_weights(
         )
         for fan_in, fan_out in pairwise(sizes)
     ]
-    if head == "gain-curve":
-        layers[-1][1][0] = -8.0
+    if head == "bin-gains":
+        layers[-1][1][:-1] -= 4.0
     mean = rng.normal(0.0, 0.5, len(features)).astype(np.float32)
     std = rng.uniform(0.05, 1.0, len(features)).astype(np.float32)
     return Weights(features, mean, std, tuple(layers), head, outputs)

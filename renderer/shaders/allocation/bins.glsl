@@ -2,6 +2,7 @@
 #include "common/bin_words.glsl"
 const int FOURS = BINS / 4;
 
+// A number of 8 bits for each.
 struct PixelBins {
     uint word[FOURS];
 };
@@ -12,7 +13,7 @@ PixelBins bins_of(uint p) {
     return bins;
 }
 
-uint count_in(PixelBins bins, int bin) {
+uint of_bin(PixelBins bins, int bin) {
     return bins.word[bin / 4] >> (8 * (bin & 3)) & 255u;
 }
 
@@ -31,12 +32,9 @@ bool fits(uint own, uint before) {
     return own < uint(FULL) && before + own <= uint(MOST_CORE);
 }
 
-// A predicted curve, log gain(k) = a - b (k - 1).
-vec2 curve_of(uint p) {
-    return uintBitsToFloat(uvec2(bin_word[curve_at(0, p)], bin_word[curve_at(1, p)]));
-}
-
-void put_curve(uint p, vec2 curve) {
-    bin_word[curve_at(0, p)] = floatBitsToUint(curve.x);
-    bin_word[curve_at(1, p)] = floatBitsToUint(curve.y);
+// A pixel's ranks, four a word (renderer/allocation/prices.py).
+PixelBins ranks_of(uint p) {
+    PixelBins ranks;
+    for (int i = 0; i < FOURS; ++i) ranks.word[i] = bin_word[ranks_at(i, p)];
+    return ranks;
 }

@@ -1,10 +1,9 @@
 #version 450
-// The cut of every pixel, in place of its curve, and fragments of every block of pixels: granted, and what they grow by
+// The cut of every pixel, in place of its ranks, and fragments of every block of pixels: granted, and what they grow by
 // at the chosen rank.
 layout(local_size_x = 256) in;
 #include "allocation/state.glsl"
 #include "allocation/bins.glsl"
-#include "allocation/rank.glsl"
 #include "allocation/cut.glsl"
 
 layout(std430, binding = 3) writeonly buffer Blocks { uvec2 sums[]; };  // [blocks]
@@ -20,7 +19,7 @@ void main() {
         uint p = block * uint(BLOCK) + i * 256u + lane;
         if (p >= pixels) continue;
         Cut cut = cut_of(p);
-        bin_word[curve_at(0, p)] = packed_cut(cut);
+        bin_word[cut_at(p)] = packed_cut(cut);
         own += uvec2(cut.fragments, cut.more_fragments - cut.fragments);
     }
     atomicAdd(sure, own.x);

@@ -3,20 +3,19 @@
 layout(local_size_x = 256) in;
 #include "allocation/state.glsl"
 #include "allocation/bins.glsl"
-#include "allocation/rank.glsl"
 
 uniform uint pixels;
 shared uint own_counted[RANKS];
 
 void add_events(uint p) {
     PixelBins bins = bins_of(p);
-    vec2 gain = curve_of(p);
+    PixelBins ranks = ranks_of(p);
     uint before = 0u;
     bool is_open = true;
     for (int bin = 0; bin < BINS; ++bin) {
-        uint own = count_in(bins, bin);
+        uint own = of_bin(bins, bin);
         is_open = is_open && fits(own, before);
-        if (is_open && own > 0u) atomicAdd(own_counted[rank_of(gain, before, before + own)], own);
+        if (is_open && own > 0u) atomicAdd(own_counted[of_bin(ranks, bin)], own);
         before += own;
     }
 }

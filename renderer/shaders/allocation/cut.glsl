@@ -7,13 +7,13 @@ struct Cut {
 Cut cut_of(uint p) {
     Cut cut = Cut(0u, 0u, 0u, 0u);
     PixelBins bins = bins_of(p);
-    vec2 gain = complete == 1u ? vec2(0.0) : curve_of(p);
+    PixelBins ranks = ranks_of(p);
     uint before = 0u;
     bool is_open = true;
     for (int bin = 0; bin < BINS; ++bin) {
-        uint own = count_in(bins, bin);
+        uint own = of_bin(bins, bin);
         is_open = is_open && fits(own, before);
-        uint found = complete == 1u ? 0u : rank_of(gain, before, before + own);
+        uint found = of_bin(ranks, bin);
         before += own;
         if (!is_open || own == 0u) continue;
         if (complete == 1u || found <= rank) {

@@ -4,7 +4,6 @@
 layout(local_size_x = 256) in;
 #include "allocation/state.glsl"
 #include "allocation/bins.glsl"
-#include "allocation/rank.glsl"
 #include "allocation/cut.glsl"
 
 layout(std430, binding = 3) readonly buffer Blocks { uvec2 sums[]; };  // [blocks], before each
@@ -12,8 +11,8 @@ uniform uint pixels;
 const uint OWN = uint(BLOCK) / 256u;
 shared uvec2 part[256];
 
-Cut cut_at(uint p) {
-    return p < pixels ? unpacked_cut(bin_word[curve_at(0, p)]) : Cut(0u, 0u, 0u, 0u);
+Cut stored_cut(uint p) {
+    return p < pixels ? unpacked_cut(bin_word[cut_at(p)]) : Cut(0u, 0u, 0u, 0u);
 }
 
 // Bins of a pixel that may grow by so many fragments and no more.
@@ -21,7 +20,7 @@ uint bins_within(uint p, Cut cut, uint room) {
     PixelBins counts = bins_of(p);
     uint bins = cut.bins, taken = 0u;
     for (uint bin = cut.bins; bin < cut.more_bins; ++bin) {
-        uint own = count_in(counts, int(bin));
+        uint own = of_bin(counts, int(bin));
         taken += own;
         if (taken > room) break;
         if (own > 0u) bins = bin + 1u;
@@ -34,7 +33,7 @@ void main() {
     uint first = block * uint(BLOCK) + lane * OWN;
     uvec2 own = uvec2(0u);
     for (uint i = 0u; i < OWN; ++i) {
-        Cut cut = cut_at(first + i);
+        Cut cut = stored_cut(first + i);
         own += uvec2(cut.fragments, cut.more_fragments - cut.fragments);
     }
     part[lane] = own;
@@ -49,7 +48,7 @@ void main() {
     for (uint i = 0u; i < OWN; ++i) {
         uint p = first + i;
         if (p >= pixels) return;
-        Cut cut = cut_at(p);
+        Cut cut = stored_cut(p);
         uint growth = cut.more_fragments - cut.fragments;
         uint begin = before.x + min(before.y, spare), bins = cut.bins;
         if (before.y + growth <= spare) bins = cut.more_bins;

@@ -20,7 +20,7 @@ void main() {
         uint before = 0u;
         bool is_open = true;
         for (int bin = 0; bin < BINS; ++bin) {
-            uint own = count_in(bins, bin);
+            uint own = of_bin(bins, bin);
             is_open = is_open && fits(own, before);
             before += is_open ? own : 0u;
         }

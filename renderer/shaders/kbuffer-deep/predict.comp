@@ -21,14 +21,8 @@ void main() {
     read_features(int(pixel[i]), known_fragments(bins_of(pixel[i])), x);
 #if FEATURES_ONLY
     for (int j = 0; j < DIAPHANE_FEATURES; ++j) feature[(i - first) * DIAPHANE_FEATURES + j] = x[j];
-#elif OUTPUTS == 1
-    answer[i - first] = diaphane_predict(x);
 #else
-#if OUTPUTS == 2
-    vec2 y = diaphane_predict(x);
-#else
-    vec3 y = diaphane_predict(x);
-#endif
-    for (int j = 0; j < OUTPUTS; ++j) answer[(i - first) * OUTPUTS + j] = y[j];
+    DiaphaneAnswer found = diaphane_predict(x);
+    for (int j = 0; j < OUTPUTS; ++j) answer[(i - first) * OUTPUTS + j] = found.y[j];
 #endif
 }

@@ -1,5 +1,5 @@
 #version 450
-// Gain curves corrected by what the last core fragments of the frame before gained, and the memory of it carried on.
+// Ranks of bins corrected by what the last core fragments of the frame before gained, and the memory of it carried on.
 layout(local_size_x = 64) in;
 #include "allocation/state.glsl"
 #include "allocation/bins.glsl"
@@ -11,12 +11,20 @@ uniform uint pixels;
 uniform int still;  // whether the camera has not moved
 
 // A correction with what was seen: each frame moves it by a smaller share of what it is wrong by, so that it settles.
-int learnt(uint word, int correction, uint frames, vec2 gain) {
-    precise float given = float(correction) / float(CORRECTION_STEPS);
-    precise float expected = gain.x + given - float(seen_k(word) - 1u) * gain.y;
-    precise float wrong = clamp(seen_gain(word) - expected, -float(MOST_WRONG), float(MOST_WRONG));
-    precise float steps = (given + wrong / float(frames + 2u)) * float(CORRECTION_STEPS);
+int learnt(uint word, int correction, uint frames, PixelBins ranks) {
+    precise float given = float(correction) / float(PRICE_STEPS);
+    precise float price = float(of_bin(ranks, int(seen_cut(word)) - 1)) / float(PRICE_STEPS) + float(LEAST_PRICE);
+    precise float wrong = clamp(seen_gain(word) + price - given, -float(MOST_WRONG), float(MOST_WRONG));
+    precise float steps = (given + wrong / float(frames + 2u)) * float(PRICE_STEPS);
     return clamp(int(floor(steps + 0.5)), -LARGEST, LARGEST);
+}
+
+void correct(uint p, PixelBins ranks, int correction) {
+    for (int i = 0; i < FOURS; ++i) {
+        uint four = 0u;
+        for (int j = 0; j < 4; ++j) four |= uint(clamp(int(of_bin(ranks, 4 * i + j)) - correction, 0, RANKS - 1)) << 8 * j;
+        bin_word[ranks_at(i, p)] = four;
+    }
 }
 
 void main() {
@@ -28,17 +36,18 @@ void main() {
         memory[p] = NOTHING;
         return;
     }
+    PixelBins ranks = ranks_of(p);
     uint word = memory[p], n = min(fragments, MOST_KNOWN), frames = 0u;
     int correction = 0;
     if (word != NOTHING && is_alike(n, known_n(word))) {
         frames = frames_of(word);
         correction = correction_of(word);
-        if (seen_k(word) > 0u && frames < uint(FRAMES)) {
-            correction = learnt(word, correction, frames, curve_of(p));
+        if (seen_cut(word) > 0u && frames < uint(FRAMES)) {
+            correction = learnt(word, correction, frames, ranks);
             ++frames;
         }
         if (still == 0) frames = min(frames, uint(MOVING_FRAMES));
     }
     memory[p] = remembered(correction, frames, n);
-    put_curve(p, curve_of(p) + vec2(float(correction) / float(CORRECTION_STEPS), 0.0));
+    correct(p, ranks, correction);
 }

@@ -1,5 +1,5 @@
 // What the last core fragment of a pixel changes of its displayed colour: the squared difference from the composite that
-// has it in the tail. By it the next frame corrects the pixel's gain curve (correct.comp).
+// has it in the tail. By it the next frame corrects the ranks of the pixel's bins (correct.comp).
 layout(std430, binding = 6) buffer Memory { uint memory[]; };  // [P]
 
 // sRGB of linear light (IEC 61966-2-1).
@@ -8,10 +8,10 @@ vec3 displayed(vec3 linear) {
     return mix(1.055 * pow(c, vec3(1.0 / 2.4)) - 0.055, 12.92 * c, lessThanEqual(c, vec3(0.0031308)));
 }
 
-// k core fragments, the last in `slot`, are seen as `seen`; without it the core is `core`, and it joins the tail's sums.
-void observe(int p, uint k, uint slot, vec3 seen, vec4 core, vec4 sums, vec4 opacity, vec3 behind) {
+// A core whose last fragment is in `slot` is seen as `seen`; without it the core is `core`, and it joins the tail's sums.
+void observe(int p, uint slot, vec3 seen, vec4 core, vec4 sums, vec4 opacity, vec3 behind) {
     uint word = memory[p];
-    if (word == NOTHING || k > MOST_SEEN) return;
+    if (word == NOTHING) return;
     uvec2 fragment = slot_of(slot);
     uint stored = fragment.x;
     float a = opacity_of(stored), weight = tail_weight(p, a, uintBitsToFloat(fragment.y));
@@ -21,5 +21,6 @@ void observe(int p, uint k, uint slot, vec3 seen, vec4 core, vec4 sums, vec4 opa
     float gain = dot(change, change);
     float least = exp(float(SEEN_LEAST));  // NaN is not above it either
     float steps = gain > least ? floor(float(SEEN_STEPS) * (log(gain) - float(SEEN_LEAST)) + 0.5) : 0.0;
-    memory[p] = (word & ~SEEN_BITS) | uint(clamp(steps, 0.0, 255.0)) << 8 | k << 16;
+    uint cut = bin_word[core_at(uint(p))] >> CURSOR_BITS;
+    memory[p] = (word & ~SEEN_BITS) | uint(clamp(steps, 0.0, 255.0)) << 8 | cut << 16;
 }

@@ -77,7 +77,7 @@ void main() {
 #endif
     vec3 seen = composed(light, sums, opacity, behind);
 #ifdef OBSERVE
-    if (i > begin) observe(p, i - begin, i - 1u, seen, without_last, sums, opacity, behind);
+    if (i > begin) observe(p, i - 1u, seen, without_last, sums, opacity, behind);
 #endif
     out_colour = vec4(seen, 1.0);
 }

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from renderer.allocation.fill import budget_fill, paper_fill, solve_lambda
+from renderer.allocation.fill import budget_fill, paper_fill
 
 
 def test_weights_share_a_budget_in_proportion() -> None:
@@ -50,7 +50,6 @@ def test_weights_that_are_no_weights_are_refused(weights: list[float]) -> None:
 def test_no_budget_leaves_every_pixel_empty() -> None:
     n = np.array([2, 0, 1])
     assert budget_fill(np.ones(3), n, 0).tolist() == [0, 0, 0]
-    assert solve_lambda(np.zeros(3), np.ones(3), n, 0)[0].tolist() == [0, 0, 0]
 
 
 def test_a_negative_budget_is_refused() -> None:
@@ -58,28 +57,13 @@ def test_a_negative_budget_is_refused() -> None:
         budget_fill(np.ones(3), np.array([2, 0, 1]), -1)
 
 
-def test_the_price_is_where_the_counts_meet_the_budget() -> None:
-    a, b, n = np.array([0.0, 1.0]), np.array([1.0, 0.5]), np.array([10, 10])
-    k, log_lambda = solve_lambda(a, b, n, budget=7)
-    assert k.sum() == 7
-    assert k.tolist() == np.clip(np.floor(1.5 + (a - log_lambda) / b), 0, n).tolist()
-
-
 def test_pixels_that_grow_together_get_the_remainder_by_index() -> None:
-    k, _ = solve_lambda(np.zeros(5), np.ones(5), np.full(5, 4), budget=12)
-    assert k.tolist() == [3, 3, 2, 2, 2]
-
-
-@pytest.mark.parametrize(("a", "b"), [(math.nan, 1.0), (0.0, 0.0), (0.0, math.inf), (math.inf, 1.0)])
-def test_curves_that_are_no_curves_are_refused(a: float, b: float) -> None:
-    with pytest.raises(ValueError, match="finite, with positive decay"):
-        solve_lambda(np.array([a]), np.array([b]), np.array([3]), 2)
+    assert budget_fill(np.ones(5), np.full(5, 4), budget=12).tolist() == [3, 3, 2, 2, 2]
 
 
 def test_no_pixels_need_nothing() -> None:
     none = np.zeros(0)
     assert budget_fill(none, none.astype(int), 5).tolist() == []
-    assert solve_lambda(none, none, none.astype(int), 5)[0].tolist() == []
     assert paper_fill(none, 5).tolist() == []
 
 
