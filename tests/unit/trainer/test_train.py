@@ -127,7 +127,7 @@ def test_features_that_never_change_are_not_read(
     for view in views:
         view.features[:, FEATURES.index("luma_mean")] = 0.33
     weights = train(views, data[1], CONFIG.model_copy(update={"steps": 1})).weights
-    assert set(result.weights.features) - set(weights.features) == {"depth_mean"}
+    assert set(result.weights.features) - set(weights.features) == {"luma_mean"}
 
 
 def test_evaluation_is_exact_for_a_predictor_that_knows_the_hull() -> None:
