@@ -126,7 +126,7 @@ def test_what_lies_outside_of_a_range_counts_as_at_its_end(tail: TailName, given
 
 def test_no_stored_alpha_is_near_half_a_unit() -> None:
     units = depth_bins.OPTICAL[1:255] * OPTICAL_UNIT
-    # A float32 logarithm of a stored alpha is off by less than 1e-6 of itself: of 1,401 units, by a thousandth and a half.
+    # A float32 logarithm is off by less than 1e-6 of itself: of 1,401 units, by a thousandth and a half.
     assert np.abs(units - np.floor(units) - 0.5).min() > 0.004
     assert (depth_bins.UNITS[1:] >= 1.0).all()
     assert depth_bins.UNITS[0] == 0.0
