@@ -106,7 +106,8 @@ def test_ranks_are_those_of_numpy(
     # A rank is rounded down, in float32 here and there.
     assert apart.max() <= 1
     assert (apart > 0).mean() < 2e-3
-    assert 0 < expected.min() < expected.max() < 255
+    seen = expected[counts[occupied] > 0]
+    assert 0 < np.percentile(seen, 5) < np.percentile(seen, 50) < 255
 
 
 @pytest.mark.parametrize("tail", BINNED_TAILS)
