@@ -48,7 +48,9 @@ install_packages() {
         uv pip install --quiet --python .venv/bin/python --require-hashes -r requirements.lock
         uv pip install --quiet --python .venv/bin/python --no-deps --no-build-isolation -e .
     else
-        .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-cache-dir --require-hashes -r requirements.lock
+        # As uv does, without compiling all that is never imported, which takes a third of the time.
+        .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-cache-dir --no-compile --require-hashes \
+            -r requirements.lock
         .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
     fi
 }
