@@ -19,7 +19,7 @@ from services.stages.inputs import TrainedOn, trained_on
 
 @pytest.fixture(scope="module")
 def arena(postgres: Postgres, s3: S3Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Arena]:
-    """A service on PostgreSQL and S3, which check more than SQLite and folders; `base@1.0.0` has one scene behind it."""
+    """A service on PostgreSQL and S3, which check more than SQLite and folders do; `base@1.0.0` saw one scene."""
     folder = tmp_path_factory.mktemp("postgresql")
     store = f"s3://{s3.new_bucket()}/some/prefix"
     with Arena(folder, postgres.new_database(), store, sleep=0.02) as found:
