@@ -21,6 +21,8 @@ find_python() {
 
 make_venv() {
     local python version
+    # It is emptied first, and through a link that would be another checkout's.
+    [ ! -L .venv ] || die ".venv leads to $(readlink .venv), which is not installed for this checkout: remove the link, then run this again."
     python=$(find_python)
     if ! "$python" -c 'import ensurepip, venv' 2>/dev/null; then
         version=$("$python" -c 'import sys; print(f"{sys.version_info.major}.{sys.version_info.minor}")')
