@@ -15,20 +15,21 @@ trap 'rm -rf "$said"' EXIT
 cores=$(nproc 2>/dev/null || echo 2)
 worst=0
 declare -A running=()
+TIMEFORMAT='took %R s, %U s and %S s of the processors'
 
 # Waits until a lane has ended, and shows what it said.
 finish_one() {
     local ended status=0
     wait -n -p ended "${!running[@]}" || status=$?
-    printf '==== %s: status %s, %s s\n' "${running[$ended]}" "$status" "$SECONDS"
-    cat "$said/${running[$ended]}"
+    printf '==== lane %s ended with %s after %s s in all; it ' "${running[$ended]}" "$status" "$SECONDS"
+    cat "$said/${running[$ended]}".{time,out}
     unset "running[$ended]"
     [ "$status" -eq 0 ] || worst=1
 }
 
 lane() { # name, command...
     [ "${#running[@]}" -le "$cores" ] || finish_one
-    "${@:2}" > "$said/$1" 2>&1 &
+    { time "${@:2}" > "$said/$1.out" 2>&1; } 2> "$said/$1.time" &
     running[$!]=$1
 }
 
