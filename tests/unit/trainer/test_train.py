@@ -172,6 +172,7 @@ def test_assets_to_stop_by_are_whole_and_a_share_of_all(assets: str, count: int)
     assert chosen == stopping_assets(sorted(assets, reverse=True), 5, seed=3)
 
 
+@pytest.mark.dear
 def test_replayed_assets_are_not_forgotten() -> None:
     old, new = [random_view("old", 1, alpha=EVEN)], [random_view("new", 2, alpha=EVEN)]
     new[0].features[:] *= -1.0  # the same curves, said in other words
