@@ -244,5 +244,5 @@ def test_a_bundle_of_a_tail_without_bins_or_of_others_is_refused(tmp_path: Path)
         Predictor.load(folder)
     manifest["tail"]["name"] = "binned-8"
     (folder / MANIFEST).write_text(json.dumps(manifest))
-    with pytest.raises(Refused, match="does not answer gain_0, .*, gain_11, prior"):
+    with pytest.raises(Refused, match=r"does not answer gain_0, .*, gain_11, prior"):
         Predictor.load(folder)
