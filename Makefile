@@ -6,7 +6,7 @@ ARGS ?=
 # The scenes that the result is judged by, and that are never trained on.
 HOLDOUT ?= bottles foliage
 
-.PHONY: help setup setup-tests quickstart bench bench-gpu check check-tests test lint format lock clean
+.PHONY: help setup setup-tests quickstart bench bench-gpu check test lint format lock clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -30,18 +30,15 @@ lint: setup ## style, types, direction of imports
 	$(BIN)/mypy
 	PYTHONPATH=deploy/client/python $(BIN)/lint-imports
 
-setup-tests: setup
+setup-tests:
 	@scripts/setup-tests.sh
 
-check: setup ## lint, then the tests of single modules and of documents: while you work; installs nothing more
-	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target lint check-tests
+check: setup ## lint, and the quick tests of single modules and of documents: while you work; installs nothing more
+	@scripts/test.sh check
 
-check-tests:
-	@$(BIN)/pytest -m "not installed" tests/unit tests/docs
-
-test: setup ## lint, then all tests
-	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target setup-tests lint
-	@BIN=$(BIN) scripts/test.sh $(ARGS)
+test: ## lint, and all tests, in lanes (CONTRIBUTING.md)
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync=target setup setup-tests
+	@scripts/test.sh $(ARGS)
 
 format: setup ## rewrite the sources in the house style
 	$(BIN)/ruff format .

@@ -1,4 +1,4 @@
-"""Order-independent per-pixel features: the raw sums of one additive pass, and what a predictor reads.
+"""Order-independent per-pixel features: the raw sums of one pass, and what a predictor reads.
 
 `gather` makes the sums from a fragment dump; the GL passes that fill the same texels per pixel are its twin. `FORMULAS`
 is the one source of every feature's formula: the shading languages' forms and `derive` are generated from it, and

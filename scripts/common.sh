@@ -5,7 +5,7 @@ say() { printf 'setup: %s\n' "$*" >&2; }
 die() { say "$*"; exit 1; }
 
 apt_install() { # why, packages...
-    local why=$1; shift
+    local why=$1 waiting=(); shift
     command -v apt-get >/dev/null || die "$why, and there is no apt-get here: install the equivalent of '$*' and run this again."
     local root=()
     if [ "$(id -u)" -ne 0 ]; then
@@ -13,6 +13,8 @@ apt_install() { # why, packages...
         root=(sudo)
     fi
     say "$why: installing $* with apt-get."
-    "${root[@]}" env DEBIAN_FRONTEND=noninteractive sh -c \
+    # setup.sh and setup-tests.sh run beside each other, and apt-get does not wait for another one's lists.
+    command -v flock >/dev/null && waiting=(flock "${TMPDIR:-/tmp}/diaphane-apt-$(id -u).lock")
+    "${waiting[@]}" "${root[@]}" env DEBIAN_FRONTEND=noninteractive sh -c \
         'apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@" >/dev/null' sh "$@"
 }

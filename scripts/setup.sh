@@ -21,6 +21,8 @@ find_python() {
 
 make_venv() {
     local python version
+    # It is emptied first, and through a link that would be another checkout's.
+    [ ! -L .venv ] || die ".venv leads to $(readlink .venv), which is not installed for this checkout: remove the link, then run this again."
     python=$(find_python)
     if ! "$python" -c 'import ensurepip, venv' 2>/dev/null; then
         version=$("$python" -c 'import sys; print(f"{sys.version_info.major}.{sys.version_info.minor}")')
@@ -48,7 +50,9 @@ install_packages() {
         uv pip install --quiet --python .venv/bin/python --require-hashes -r requirements.lock
         uv pip install --quiet --python .venv/bin/python --no-deps --no-build-isolation -e .
     else
-        .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-cache-dir --require-hashes -r requirements.lock
+        # As uv does, without compiling all that is never imported, which takes a third of the time.
+        .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-cache-dir --no-compile --require-hashes \
+            -r requirements.lock
         .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
     fi
 }

@@ -1,33 +1,76 @@
 #!/usr/bin/env bash
-# All tests, two sets of them at once, each of which uses one core: those of single modules beside those of the renderer
-# and the engine's kills; then, of tests/integration, those that compute themselves beside those that wait for processes
-# that they start and kill. With arguments: pytest with these.
+# Tests in lanes: processes of which one more runs at a time than there are cores, because some of them mostly wait for
+# processes that they start and kill. A lane's words are shown when it has ended. The lanes that compute kernels begin,
+# and those that take the kernels from them (tests/support/kernels.py) come late.
+#   scripts/test.sh            everything, beside the linters
+#   scripts/test.sh check      single modules and documents, beside the linters: nothing that has to be installed
+#   scripts/test.sh WORDS...   pytest with these
 set -uo pipefail
-pytest="${BIN:-.venv/bin}/pytest"
-if [ "$#" -gt 0 ]; then
-    exec "$pytest" "$@"
-fi
-said=$(mktemp)
-trap 'rm -f "$said"' EXIT
+export BIN=${BIN:-.venv/bin}
+# Lanes keep the cores busy. Threads of one and the same small computation would wait for each other, and do so by
+# turning: a fifth of the processor time of training, of compiled kernels and of the rasteriser.
+threads=(OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 LP_NUM_THREADS=1)
+said=$(mktemp -d)
+trap 'rm -rf "$said"' EXIT
+cores=$(nproc 2>/dev/null || echo 2)
 worst=0
+declare -A running=()
+TIMEFORMAT='took %R s, %U s and %S s of the processors'
 
-# Runs tests beside the next ones, until `join` shows what they said.
-beside() {
-    "$pytest" --durations=15 -p no:cacheprovider "$@" > "$said" 2>&1 &
+# Waits until a lane has ended, and shows what it said.
+finish_one() {
+    local ended status=0
+    wait -n -p ended "${!running[@]}" || status=$?
+    printf '==== lane %s ended with %s after %s s in all; it ' "${running[$ended]}" "$status" "$SECONDS"
+    cat "$said/${running[$ended]}".{time,out}
+    unset "running[$ended]"
+    [ "$status" -eq 0 ] || worst=1
 }
 
-join() {
-    wait "$!" || worst=$?
-    cat "$said"
+lane() { # name, command...
+    [ "${#running[@]}" -le "$cores" ] || finish_one
+    { time "${@:2}" > "$said/$1.out" 2>&1; } 2> "$said/$1.time" &
+    running[$!]=$1
 }
 
-computing=(tests/integration/test_{build,cli,cli_bench,cli_remote,cli_render,cli_view,retrain,stress_gl,web_client,zink}.py)
-computing+=(tests/integration/test_{gpu_benchmark,labeller_benchmark,predictors_benchmark,view_window,web_build}.py)
+tests() { # name, pytest's words...
+    lane "$1" env "${threads[@]}" "$BIN/pytest" --durations=10 -p no:cacheprovider "${@:2}"
+}
 
-beside tests/unit tests/property
-"$pytest" --durations=15 tests/attacks tests/chaos tests/differential tests/docs tests/golden || worst=$?
-join
-beside "${computing[@]}"
-"$pytest" --durations=15 tests/integration "${computing[@]/#/--ignore=}" || worst=$?
-join
+integration() { # of tests/integration, without test_ and .py
+    printf 'tests/integration/test_%s.py\n' "$@"
+}
+
+browsers=(compare_browser dashboard_browser view_window web_build web_client)
+computing=(build cli_bench gpu_benchmark labeller_benchmark predictors_benchmark retrain stress_gl zink)
+deployed=(deploy_compose deploy_images deploy_k8s deploy_run)
+
+everything() {
+    local apart
+    mapfile -t apart < <(integration "${browsers[@]}" "${computing[@]}" "${deployed[@]}")
+    lane lint make --no-print-directory lint
+    tests differential tests/differential
+    tests chaos tests/chaos
+    tests services tests/unit/services tests/unit/client
+    mapfile -t found < <(integration "${computing[@]}") && tests computing "${found[@]}"
+    tests modules tests/unit tests/property tests/docs --ignore=tests/unit/services --ignore=tests/unit/client
+    tests integration tests/integration "${apart[@]/#/--ignore=}"
+    mapfile -t found < <(integration "${browsers[@]}") && tests browsers "${found[@]}" tests/golden
+    mapfile -t found < <(integration "${deployed[@]}") && tests deployed "${found[@]}"
+    tests attacks tests/attacks
+}
+
+check() {
+    local quick=(-m "not installed and not dear")
+    lane lint make --no-print-directory lint
+    tests services "${quick[@]}" tests/unit/services
+    tests modules "${quick[@]}" tests/unit tests/docs --ignore=tests/unit/services
+}
+
+case "${1:-}" in
+    "") everything ;;
+    check) check ;;
+    *) exec "$BIN/pytest" "$@" ;;
+esac
+while [ "${#running[@]}" -gt 0 ]; do finish_one; done
 exit "$worst"

@@ -19,8 +19,12 @@ PRESETS: Final[dict[Preset, dict[str, Any]]] = {
 }
 """Settings of each preset that differ from the defaults; what else a preset decides is in `trainer.heads`."""
 
+READ: Final = tuple(name for name in FEATURES if not name.startswith(("background_", "mean_")))
+"""Features that help to tell the gain of bins; what lies behind, and where in its bin the optical depth is, does not
+(benchmarks/TRIALS.md)."""
+
 SIZES: Final[dict[NetworkSize, dict[str, Any]]] = {
-    "tiny": {"hidden": (16, 8), "features": tuple(name for name in FEATURES if not reads_luma([name]))},
+    "tiny": {"hidden": (16,), "features": tuple(name for name in READ if not reads_luma([name]))},
     "small": {},
     "full": {"hidden": (64, 32), "steps": 4000},
 }
@@ -64,7 +68,7 @@ class TrainConfig(BaseModel):
     batch: int = Field(default=4096, ge=GROUP)
     lr: float = Field(default=4e-3, gt=0.0)
     hidden: tuple[int, ...] = (32,)
-    features: tuple[str, ...] = FEATURES
+    features: tuple[str, ...] = READ
     view_weight: float = Field(default=0.5, ge=0.0, le=1.0)
     leak: float = Field(default=0.02, ge=0.0)
     validate_every: int = Field(default=500, gt=0)

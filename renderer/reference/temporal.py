@@ -33,7 +33,7 @@ class Remembered:
     Attributes:
         is_open: bool [P], whether the pixel had a choice; all else is 0 where it had not.
         correction: Of the ranks of its bins: what is added to their log gain, in `PRICE_STEPS` a unit.
-        seen: Log gain of the last core fragment, in `SEEN_STEPS` a unit above `SEEN_LEAST`.
+        seen: Log gain of each fragment of the last core bin, in `SEEN_STEPS` a unit above `SEEN_LEAST`.
         cut: Bins in the core when that was seen; 0: it was not.
         frames: That have corrected it.
         n: Fragments, at most `MOST_KNOWN`.
@@ -102,16 +102,19 @@ def corrected(
     return np.clip(ranks.astype(np.int64) - correction[:, None], 0, RANKS - 1), kept
 
 
-def observed(before: Remembered, cut: NDArray[np.integer], seen: Floats, without_last: Floats) -> Remembered:
+def observed(
+    before: Remembered, cut: NDArray[np.integer], last: NDArray[np.integer], seen: Floats, without_last: Floats
+) -> Remembered:
     """What is remembered when a frame is resolved.
 
     Args:
         before: From `corrected`.
         cut: int [P], bins in the core.
+        last: int [P], fragments of the last of them.
         seen: float64 [P, 3], linear RGB, the picture.
-        without_last: float64 [P, 3], the same with one core fragment less; not read where there is none.
+        without_last: float64 [P, 3], the same with that bin in the tail; not read where there is none.
     """
-    gain = np.square(linear_to_srgb(seen) - linear_to_srgb(without_last)).sum(axis=1)
+    gain = np.square(linear_to_srgb(seen) - linear_to_srgb(without_last)).sum(axis=1) / np.maximum(last, 1)
     # NaN is no gain that anybody has seen, and counts as the least.
     log_gain = np.log(np.where(gain > np.exp(SEEN_LEAST), gain, np.exp(SEEN_LEAST)))
     code = np.clip(np.floor((log_gain - SEEN_LEAST) * SEEN_STEPS + 0.5), 0, 255)

@@ -1,4 +1,4 @@
-"""`binned`: a binned tail and nothing else, two additive passes (METHOD.md 2).
+"""`binned`: a binned tail and nothing else, an atomic and an additive pass (METHOD.md 2).
 
 The first pass gathers depth bins, one atomic a fragment, the second weighs every fragment by what they know to be in
 front of it. There are no slots, no order of fragments, and no network. `kbuffer-deep` is this with a core.

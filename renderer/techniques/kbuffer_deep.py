@@ -150,19 +150,6 @@ class KBufferDeep:
         prior = prior_gains(*shares_of(binned.kept()[pixels], self._tail), counts, self._tail)
         return ranks_of(gain_prices(answers, prior), counts)
 
-    def ranks(self, frame: Frame, pixels: NDArray[np.uint32]) -> NDArray[np.uint8]:
-        """Run the network, and rank what it answers.
-
-        Args:
-            frame: The view.
-            pixels: uint32 [M], indices of occupied pixels.
-
-        Returns:
-            uint8 [M, B], of the price from which each bin is in the core (`renderer.allocation.prices`).
-        """
-        binned = self._counted(frame)
-        return self._ranks(binned, pixels, self._answers(frame, binned, pixels))
-
     def predict(self, frame: Frame, pixels: NDArray[np.uint32]) -> NDArray[np.float32]:
         """Run the network.
 

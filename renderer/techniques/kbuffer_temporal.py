@@ -1,9 +1,9 @@
 """`kbuffer-temporal`: `kbuffer-deep` that learns from its last frame (METHOD.md 4).
 
-A resolved pixel knows what its last core fragment gained: the squared change of its displayed colour when that fragment
-is in the core instead of the tail. In the next frame, the prices of the pixel's bins are moved by what that was above
-or below the price of its last core bin, before the budget is spent, which is met as ever. Each pixel remembers in one
-word the sum of its moves, what was seen, and n.
+A resolved pixel knows what each fragment of its last core bin gained: the squared change of its displayed colour when
+that bin is in the core instead of the tail, shared by them. In the next frame, the prices of all its bins are moved by
+what that was above or below the price of that bin, before the budget is spent, which is met as ever. Each pixel
+remembers in one word the sum of its moves, what was seen, and n.
 
 - A move is a share of what the price was wrong by: half of it at first, a third in the next frame, and so on. With a
   constant share, pixels jump to and fro between two cuts for ever; so they settle, and a still camera's picture stands

@@ -1,4 +1,4 @@
-"""`kbuffer-deep` with importances: they become curves in the frame, and cuts as in the twin."""
+"""`kbuffer-deep` with importances: they become prices in the frame, and cuts as in the twin."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import pytest
 from numpy.typing import NDArray
 from support.training import export_random, random_weights
 
-from renderer.allocation.cuts import events_of, importance_curve, solve_cuts
+from renderer.allocation.cuts import events_of, solve_cuts
 from renderer.allocation.gpu import FrameAllocation
+from renderer.allocation.prices import importance_prices, ranks_of
 from renderer.bin_pass import Binned
 from renderer.features import TEXELS, derive, gather
 from renderer.frame import Frame
@@ -20,14 +21,15 @@ from schemas.fragments import FragmentDump
 from schemas.tail import DEFAULT_TAIL
 
 _GIVEN = 4
-"""A storage binding that `curves.comp` does not use."""
+"""A storage binding that `prices.comp` does not use."""
 NETWORK = f"""
 #define DIAPHANE_FEATURES 1
 layout(std430, binding = {_GIVEN}) readonly buffer Given {{ float given[]; }};
 void diaphane_features(in vec4 s[{TEXELS}], out float x[DIAPHANE_FEATURES]) {{ x[0] = 0.0; }}
-float diaphane_predict(in float x[DIAPHANE_FEATURES]) {{
+struct DiaphaneAnswer {{ float y[1]; }};
+DiaphaneAnswer diaphane_predict(in float x[DIAPHANE_FEATURES]) {{
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    return given[64u * group + gl_LocalInvocationIndex];
+    return DiaphaneAnswer(float[1](given[64u * group + gl_LocalInvocationIndex]));
 }}
 """
 """Answers what a buffer holds for the pixel."""
@@ -41,16 +43,16 @@ class Given(KBufferDeep):
         self._texts = {"bundle/predict.glsl": NETWORK}
         self._importance = importance
 
-    def _predict_curves(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> None:
+    def _predict_ranks(self, frame: Frame, binned: Binned, allocation: FrameAllocation) -> None:
         given = frame.ctx.buffer(self._importance)  # bound for as long as it is held
         given.bind_to_storage_buffer(_GIVEN)
-        super()._predict_curves(frame, binned, allocation)
+        super()._predict_ranks(frame, binned, allocation)
 
 
 @pytest.fixture(scope="module")
 def bundle(dump: FragmentDump, gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("bundle")
-    network = random_weights(5, ("log_n", "front_2"), (8,), "importance", ("importance",))
+    network = random_weights(5, ("log_n", "front_2"), (8,), "importance")
     export_random(folder, network, derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0], gl)
     return folder
 
@@ -74,13 +76,13 @@ def cases(rng: np.random.Generator, pixels: int) -> dict[str, NDArray[np.float32
 
 @pytest.mark.parametrize("name", list(cases(np.random.default_rng(0), 1)))
 def test_cuts_are_those_of_the_twin(bundle: Path, frame: Frame, dump: FragmentDump, name: str) -> None:
-    """From no fragment to more than there are; a reciprocal that the driver rounds otherwise moves few of them."""
+    """From no fragment to more than there are; a logarithm that the driver rounds otherwise moves few of them."""
     importance = cases(np.random.default_rng(3), dump.pixels)[name]
     by_bin = frame.kept_bins(DEFAULT_TAIL).counts()
-    deep = Given(bundle, importance)
+    deep, ranks = Given(bundle, importance), ranks_of(importance_prices(importance, by_bin), by_bin)
     for fragments in (0, 1, dump.total // 10, dump.total // 3, dump.total - 1, dump.total, 2 * dump.total):
         k = deep.render(frame, Budget(fragments)).k
-        expected = solve_cuts(events_of(*importance_curve(importance), by_bin), fragments).k
+        expected = solve_cuts(events_of(ranks, by_bin), fragments).k
         assert k.sum() <= fragments
         assert ((k >= 0) & (k <= dump.counts)).all()
         assert np.count_nonzero(k != expected) <= 1e-3 * np.count_nonzero(dump.counts)

@@ -7,7 +7,7 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from support.ranks import ranks_and_counts
 from support.scenes import SIZE, VIEW, shells
 from support.training import export_overflowing, export_random, random_weights
 
@@ -61,16 +61,11 @@ def fragments_of(dump: FragmentDump, share: float) -> int:
     return int(share * dump.total)
 
 
-def counts_of(frame: Frame) -> NDArray[np.uint8]:
-    """uint8 [P, B], fragments of the bins."""
-    return frame.kept_bins(DEFAULT_TAIL).counts()
-
-
 @pytest.mark.parametrize("tail", BINNED_TAILS)
 def test_first_frame_is_that_of_kbuffer_deep_and_sees_what_last_fragments_change(
     gpu: GpuScene, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, tail: TailName
 ) -> None:
-    export_random(tmp_path, random_weights(11), derive(gather(dump, tail))[dump.counts > 0], gl, tail)
+    export_random(tmp_path, random_weights(11, tail=tail), derive(gather(dump, tail))[dump.counts > 0], gl, tail)
     budget, temporal = Budget(fragments_of(dump, 0.3), tail), KBufferTemporal(tmp_path)
     first = temporal.render(Frame(gpu, VIEW, *SIZE, float_sums=True), budget)
     plain = KBufferDeep(tmp_path).render(Frame(gpu, VIEW, *SIZE, float_sums=True), budget)
@@ -80,12 +75,13 @@ def test_first_frame_is_that_of_kbuffer_deep_and_sees_what_last_fragments_change
     assert first.early_bytes == plain.early_bytes + MEMORY_BYTES
 
     is_open = dump.counts > 0
-    zero = np.zeros(dump.pixels)
-    _, before = twin.corrected(twin.nothing(dump.pixels), zero, zero + 1.0, dump.counts, is_open, still=False)
-    fewer = np.maximum(first.k - 1, 0)
-    pictures = (composite(dump, k, tail, budget.g).astype(np.float64) for k in (first.k, fewer))
-    expected, found = twin.observed(before, first.k, *pictures), memory_of(temporal)
-    for field in ("is_open", "correction", "k", "frames", "n"):
+    ranks, counts = ranks_and_counts(KBufferDeep(tmp_path), Frame(gpu, VIEW, *SIZE, float_sums=True))
+    _, before = twin.corrected(twin.nothing(dump.pixels), ranks, dump.counts, is_open, still=False)
+    cut = solve_cuts(events_of(ranks, counts), budget.fragments).cut
+    last = np.where(cut > 0, counts[np.arange(dump.pixels), np.maximum(cut - 1, 0)], 0)
+    pictures = (composite(dump, k, tail, budget.g).astype(np.float64) for k in (first.k, first.k - last))
+    expected, found = twin.observed(before, cut, last, *pictures), memory_of(temporal)
+    for field in ("is_open", "correction", "cut", "frames", "n"):
         assert np.array_equal(getattr(found, field), getattr(expected, field)), field
     # A change of the colour below 1e-4 is found by subtraction in float32.
     clear = expected.seen > 80
@@ -110,16 +106,14 @@ def test_next_frames_are_those_of_the_twin(gpu: GpuScene, bundle: Path, moves: b
         found = memory_of(temporal)
         if before is not None:
             is_open = n > 0
-            a, b = np.zeros(frame.pixels), np.ones(frame.pixels)
-            listed = np.flatnonzero(is_open).astype(np.uint32)
-            a[listed], b[listed] = deep.predict(frame, listed).T
-            expected_a, expected = twin.corrected(before, a, b, n, is_open, still=not moves)
+            ranks, counts = ranks_and_counts(deep, frame)
+            corrected, expected = twin.corrected(before, ranks, n, is_open, still=not moves)
             assert np.array_equal(found.is_open, is_open)
             for field in ("correction", "frames", "n"):
                 apart = np.abs(getattr(found, field) - getattr(expected, field))
                 assert apart.max() <= (field == "correction"), field
                 assert (apart == 0).mean() > 0.99, field
-            k = solve_cuts(events_of(expected_a, b, counts_of(frame)), budget.fragments).k
+            k = solve_cuts(events_of(corrected, counts), budget.fragments).k
             # Corrections are whole steps: a pixel whose correction is rounded the other way may have another cut.
             assert (rendered.k == k).mean() > 0.99
             learnt += int(np.count_nonzero(found.correction))
@@ -131,15 +125,15 @@ def test_it_learns_and_then_stands_still(gpu: GpuScene, bundle: Path, dump: Frag
     curves = error_curves(dump, DEFAULT_TAIL)
     temporal, budget = KBufferTemporal(bundle), Budget(fragments_of(dump, 0.3))
     errors, ks = [], []
-    # A pixel without a core sees nothing in a frame: this view stands still after 28 frames.
-    for _ in range(2 * FRAMES):
+    # A pixel without a core sees nothing in a frame, so that it takes some of them longer.
+    for _ in range(4 * FRAMES):
         rendered = temporal.render(Frame(gpu, VIEW, *SIZE), budget)
         errors.append(curves.total(rendered.k))
         ks.append(rendered.k)
     assert errors[SETTLED - 1] < 0.9 * errors[0]
     assert np.array_equal(ks[-1], ks[-2])
     found = memory_of(temporal)
-    assert found.frames[found.k > 0].max() == FRAMES
+    assert found.frames[found.cut > 0].max() == FRAMES
 
 
 def test_the_same_frames_are_the_same_pictures(gpu: GpuScene, bundle: Path) -> None:
@@ -198,7 +192,7 @@ def test_a_frame_that_fails_leaves_nothing_behind(gpu: GpuScene, bundle: Path, m
     temporal, budget = KBufferTemporal(bundle), Budget(SMALL[0] * SMALL[1])
     first = temporal.render(Frame(gpu, VIEW, *SMALL), budget)
     with monkeypatch.context() as patch:
-        patch.setattr(KBufferDeep, "_predict_curves", lambda *_: (_ for _ in ()).throw(Problem("Full.", "Smaller.")))
+        patch.setattr(KBufferDeep, "_predict_ranks", lambda *_: (_ for _ in ()).throw(Problem("Full.", "Smaller.")))
         with pytest.raises(Problem):
             temporal.render(Frame(gpu, turned(1), *SMALL), budget)
     assert np.array_equal(temporal.render(Frame(gpu, VIEW, *SMALL), budget).linear, first.linear)
@@ -225,7 +219,7 @@ def test_small_and_empty_pictures(gpu: GpuScene, bundle: Path, size: tuple[int, 
             assert np.isfinite(rendered.linear).all()
 
 
-def test_curves_that_are_no_numbers_stay_within_the_budget(
+def test_answers_that_are_no_numbers_stay_within_the_budget(
     gpu: GpuScene, gl: moderngl.Context, dump: FragmentDump, tmp_path: Path
 ) -> None:
     export_overflowing(tmp_path, random_weights(3), derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0], gl)
@@ -238,13 +232,13 @@ def test_curves_that_are_no_numbers_stay_within_the_budget(
         assert np.abs(memory_of(temporal).correction).max() <= twin.LARGEST
 
 
-def test_without_curves_on_the_gpu_there_is_nothing_to_correct(
+def test_without_prices_on_the_gpu_there_is_nothing_to_correct(
     gpu: GpuScene, bundle: Path, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path
 ) -> None:
-    weights = random_weights(5, ("log_n",), (8,), "importance", ("importance",))
+    weights = random_weights(5, ("log_n",), (8,), "importance")
     export_random(tmp_path, weights, derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0], gl)
     for temporal in (KBufferTemporal(tmp_path), KBufferTemporal(bundle, "onnx")):
-        with pytest.raises(Problem, match="corrects gain curves on the GPU") as caught:
+        with pytest.raises(Problem, match="corrects prices of bins on the GPU") as caught:
             temporal.render(Frame(gpu, VIEW, *SMALL), Budget(1000))
         assert caught.value.code == ExitCode.LIMIT
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 from support.deploy import own_services
+from support.kernels import warm
 from support.postgres import Postgres
 from support.processes import Service
 from support.s3 import S3Server
@@ -61,9 +62,12 @@ def running(postgres: Postgres, tmp_path_factory: pytest.TempPathFactory) -> Ite
         refused = api.run(*[word.replace("8035", str(port)) for word in own_services()["api"]["command"]])
         made = api.run("diaphane", "keys", "create", "admin", "--scope", "admin", "--local")
         assert made.returncode == 0, made.stderr
+        key = made.stdout.strip()
+        owner = f"key_{key.split('_')[1]}"
+        warm(folder / name / "work" / "kernels" / owner for name in services)
         for service in services.values():
             service.start(port)
-        yield Running(services, refused, made.stdout.strip())  # type: ignore[arg-type]
+        yield Running(services, refused, key)  # type: ignore[arg-type]
     finally:
         for service in services.values():
             service.kill()

@@ -18,8 +18,12 @@ from support.drivers import ROOT, environment, facts, lavapipe_installed
 from services.stress.gl_drivers import LLVMPIPE, ZINK
 
 ONE_PASS = "tests/differential/test_chain_one_pass.py"
-# Of the stress test's own judgement, and of a benchmark; the stress test itself runs on every driver.
-NOT_OF_DRIVERS = {"test_stress_gl_passes.py", "test_bench.py"}
+NOT_OF_DRIVERS = {
+    "test_stress_gl_passes.py",  # how the stress test judges; the stress test itself draws on every driver
+    "test_many_fragments.py",  # stacks that the stress test draws on every driver (services/stress/gl_stacks.py)
+    "test_bench.py",  # what a benchmark plans and keeps
+    "test_glsl.py",  # the reference compiler of GLSL, which is no driver's
+}
 TECHNIQUES = sorted(
     path.relative_to(ROOT).as_posix()
     for path in (ROOT / "tests" / "differential").glob("test_*.py")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import struct
+import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,71 +11,65 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from renderer.allocation.cuts import (
-    DROPPED_BITS,
-    FULL,
-    LEAST_FALL,
+from renderer.allocation.cuts import FULL, MOST_CORE, Cuts, events_of, solve_cuts, usable_counts
+from renderer.allocation.prices import (
     LEAST_PRICE,
-    MOST_CORE,
-    MOST_FALL,
-    MOST_GAIN,
+    LEAST_PRIOR,
+    PRICE_STEPS,
     RANKS,
-    Cuts,
-    events_of,
-    importance_curve,
-    rank_of,
-    solve_cuts,
-    usable_counts,
-    within_limits,
+    gain_prices,
+    importance_prices,
+    prior_gains,
+    ranks_of,
 )
-from renderer.allocation.fill import solve_lambda
-from schemas.bundle import GAIN_FLOOR
+from schemas.tail import DEFAULT_TAIL, TAILS
 
 pytestmark = pytest.mark.usefixtures("single_thread")
 
 NAN, INF = float("nan"), float("inf")
-gain = st.one_of(st.sampled_from([0.0, -8.0, -1e30, 1e30, NAN, INF, -INF]), st.floats(-200.0, 200.0, width=32))
-fall = st.one_of(st.sampled_from([0.5, GAIN_FLOOR, 1e30, NAN, INF]), st.floats(0.03125, 300.0, width=32))
+price = st.one_of(st.sampled_from([0.0, 8.0, -1e30, 1e30, NAN, INF, -INF]), st.floats(-20.0, 60.0, width=32))
 count = st.one_of(st.integers(0, 4), st.sampled_from([0, 1, 40, FULL - 1, FULL]))
 
 
+Frame = tuple[NDArray[np.float32], NDArray[np.int64], int]
+
+
 @st.composite
-def frames(draw: st.DrawFn) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64], int]:
-    """Curves, counts by bin, and a budget, often one on an edge; all pixels are alike at times."""
+def frames(draw: st.DrawFn) -> Frame:
+    """Prices and counts by bin, and a budget, often one on an edge; all pixels are alike at times."""
     pixels, bins = draw(st.integers(1, 8)), draw(st.sampled_from([4, 8, 12]))
-    counts = np.array(draw(st.lists(st.lists(count, min_size=bins, max_size=bins), min_size=pixels, max_size=pixels)))
-    a, b = (np.array([draw(each) for _ in range(pixels)], dtype=np.float32) for each in (gain, fall))
+
+    def rows(each: st.SearchStrategy[float] | st.SearchStrategy[int]) -> st.SearchStrategy[list[list[float]]]:
+        return st.lists(st.lists(each, min_size=bins, max_size=bins), min_size=pixels, max_size=pixels)
+
+    counts, prices = np.array(draw(rows(count))), np.array(draw(rows(price)), dtype=np.float32)
     if draw(st.booleans()):
-        a, b = np.full(pixels, a[0]), np.full(pixels, b[0])
+        prices[:] = prices[0]
     total = int(usable_counts(counts).sum())
     edges = {0, 1, max(total - 1, 0), total, 2 * total}
-    return a, b, counts, draw(st.one_of(st.sampled_from(sorted(edges)), st.integers(0, total + 1)))
+    return prices, counts, draw(st.one_of(st.sampled_from(sorted(edges)), st.integers(0, total + 1)))
 
 
-def plain_rank(a: np.float32, b: np.float32, before: int, after: int) -> int:
-    """Rank of one price, spelled out: the upper bits of the float32 number that it is above the least price."""
-    price = np.float32(b * np.float32(np.float32(0.5 * (before + after)) - np.float32(1.0))) - a
-    above = max(np.float32(price - np.float32(LEAST_PRICE)), np.float32(1.0))
-    (bits,), (one,) = (struct.unpack("<I", struct.pack("<f", number)) for number in (above, 1.0))
-    return min(int(bits - one) >> DROPPED_BITS, RANKS - 1)
+def plain_rank(price: float) -> int:
+    """Rank of one price, spelled out."""
+    if math.isnan(price):
+        return RANKS - 1
+    return math.floor(min(max((price - LEAST_PRICE) * PRICE_STEPS + 0.5, 0), RANKS - 1))
 
 
-def plain_cuts(
-    a: NDArray[np.float32], b: NDArray[np.float32], counts: NDArray[np.integer], budget: int
-) -> tuple[list[int], list[int]]:
+def plain_cuts(prices: NDArray[np.float32], counts: NDArray[np.integer], budget: int) -> tuple[list[int], list[int]]:
     """Cuts and k of all pixels: events one by one, by rising rank, then pixel and bin, until one no longer fits."""
-    gains, falls = within_limits(a, b)
     events: dict[int, list[tuple[int, int, int]]] = {}
     for p, row in enumerate(counts.tolist()):
-        before = 0
+        before, rank = 0, 0
         for bin_, own in enumerate(row):
             if own >= FULL or before + own > MOST_CORE:
                 break
             if own:
-                rank = plain_rank(gains[p], falls[p], before, before + own)
+                rank = max(rank, plain_rank(float(prices[p, bin_])))
                 events.setdefault(rank, []).append((p, bin_, own))
             before += own
-    cut, k, spent = [0] * len(a), [0] * len(a), 0
+    cut, k, spent = [0] * len(counts), [0] * len(counts), 0
     for rank in sorted(events):
         for p, bin_, own in sorted(events[rank]):
             if spent + own > budget:
@@ -83,29 +78,25 @@ def plain_cuts(
     return cut, k
 
 
-def solve(a: NDArray[np.floating], b: NDArray[np.floating], counts: NDArray[np.integer], budget: int) -> Cuts:
-    return solve_cuts(events_of(a, b, counts), budget)
+def solve(prices: NDArray[np.floating], counts: NDArray[np.integer], budget: int) -> Cuts:
+    return solve_cuts(events_of(ranks_of(prices.astype(np.float32), counts), counts), budget)
 
 
 @settings(max_examples=400)
 @given(frames())
-def test_cuts_are_those_of_the_plain_loop(
-    frame: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64], int],
-) -> None:
-    a, b, counts, budget = frame
-    found = solve(a, b, counts, budget)
-    cut, k = plain_cuts(a, b, counts, budget)
+def test_cuts_are_those_of_the_plain_loop(frame: Frame) -> None:
+    prices, counts, budget = frame
+    found = solve(prices, counts, budget)
+    cut, k = plain_cuts(prices, counts, budget)
     assert found.cut.tolist() == cut
     assert found.k.tolist() == k
 
 
 @settings(max_examples=300)
 @given(frames())
-def test_a_budget_is_met_up_to_one_bin_of_one_pixel(
-    frame: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64], int],
-) -> None:
-    a, b, counts, budget = frame
-    usable, found = usable_counts(counts), solve(a, b, counts, budget)
+def test_a_budget_is_met_up_to_one_bin_of_one_pixel(frame: Frame) -> None:
+    prices, counts, budget = frame
+    usable, found = usable_counts(counts), solve(prices, counts, budget)
     assert found.k.sum() <= budget
     bins = np.arange(counts.shape[1])
     assert np.array_equal(found.k, np.where(bins < found.cut[:, None], usable, 0).sum(axis=1))
@@ -119,20 +110,17 @@ def test_a_budget_is_met_up_to_one_bin_of_one_pixel(
 
 
 @given(frames())
-def test_what_a_price_grants_is_granted_at_any_greater_budget(
-    frame: tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int64], int],
-) -> None:
-    a, b, counts, budget = frame
-    less, more = (solve(a, b, counts, each) for each in (budget, budget + 7))
+def test_what_a_price_grants_is_granted_at_any_greater_budget(frame: Frame) -> None:
+    prices, counts, budget = frame
+    less, more = (solve(prices, counts, each) for each in (budget, budget + 7))
     assert more.rank is None or (less.rank is not None and less.rank <= more.rank)
     # Of the pixels that grow at one price the first ones by index do: more of them for a greater budget.
     assert (more.cut >= less.cut).all()
 
 
-@given(gain, fall, st.lists(st.integers(0, 60), min_size=4, max_size=12))
-def test_ranks_rise_from_bin_to_bin(a: float, b: float, row: list[int]) -> None:
-    events = events_of(np.array([a]), np.array([b]), np.array([row]))
-    ranks = events.rank[events.growth > 0]
+@given(st.lists(price, min_size=8, max_size=8), st.lists(st.integers(0, 60), min_size=8, max_size=8))
+def test_ranks_rise_from_bin_to_bin(prices: list[float], row: list[int]) -> None:
+    ranks = ranks_of(np.array([prices], dtype=np.float32), np.array([row]))[0].astype(int)
     assert (np.diff(ranks) >= 0).all()
     assert ((ranks >= 0) & (ranks <= RANKS - 1)).all()
 
@@ -140,10 +128,10 @@ def test_ranks_rise_from_bin_to_bin(a: float, b: float, row: list[int]) -> None:
 @given(st.floats(width=32, allow_nan=False), st.floats(width=32, allow_nan=False))
 def test_ranks_do_not_fall_as_prices_rise(one: float, other: float) -> None:
     low, high = sorted((one, other))
-    ranks = rank_of(np.array([low, high], dtype=np.float32))
+    ranks = [int(ranks_of(np.array([[each]], dtype=np.float32), np.ones((1, 1)))[0, 0]) for each in (low, high)]
     assert ranks[0] <= ranks[1]
-    if low > LEAST_PRICE + 1.0 and high < 60_000.0 and high - low > 2.0**-8 * (high - LEAST_PRICE):
-        assert ranks[0] < ranks[1], "those around 10 are told from each other if they are 1/14 apart"
+    if low > LEAST_PRICE and high < LEAST_PRICE + (RANKS - 2) / PRICE_STEPS and high - low > 1.01 / PRICE_STEPS:
+        assert ranks[0] < ranks[1]
 
 
 @given(st.lists(count, min_size=4, max_size=16))
@@ -159,80 +147,83 @@ def test_bins_that_are_full_or_beyond_the_longest_core_end_it(row: list[int]) ->
 def test_the_longest_core_is_met_and_not_exceeded() -> None:
     row = [254, 254, 254, 254, 7, 1, 0, 1]
     assert sum(row[:5]) == MOST_CORE
-    found = solve(np.zeros(1), np.ones(1), np.array([row]), 10_000)
+    found = solve(np.arange(8.0)[None], np.array([row]), 10_000)
     assert (found.cut.tolist(), found.k.tolist(), found.rank) == ([5], [MOST_CORE], None)
 
 
-@settings(max_examples=200)
-@given(st.lists(st.integers(0, 12), min_size=1, max_size=20), st.data())
-def test_with_one_fragment_a_bin_the_counts_are_those_of_lambda_but_for_near_ties(
-    lists: list[int], data: st.DataObject
-) -> None:
-    n = np.array(lists)
-    counts = (np.arange(12) < n[:, None]).astype(np.int64)
-    a = np.array([data.draw(st.floats(-30.0, 10.0, width=32)) for _ in lists], dtype=np.float32)
-    b = np.array([data.draw(st.floats(0.03125, 4.0, width=32)) for _ in lists], dtype=np.float32)
-    budget = data.draw(st.integers(0, int(n.sum()) + 1))
-    found = solve(a, b, counts, budget)
-    expected, log_lambda = solve_lambda(a, b, n, budget)
-    # Prices of one rank are as one: they are within 2^-13 of their size, and a rounding, of each other.
-    near = 2.0**-12 * (1.0 + float(np.abs(a).max()) + float(12 * b.max()))
-    for p in np.flatnonzero(found.k != expected):
-        k = np.arange(min(found.k[p], expected[p]) + 1, max(found.k[p], expected[p]) + 1)
-        assert (np.abs((k - 1.5) * b[p].astype(np.float64) - a[p] + log_lambda) <= near).all()
-
-
-def test_equal_curves_share_by_index_until_one_does_not_fit() -> None:
+def test_equal_prices_share_by_index_until_one_does_not_fit() -> None:
     counts = np.tile([2, 3, 0, 4], (10, 1))
-    found = solve(np.full(10, -8.0), np.full(10, 0.5), counts, 20 + 3 * 4 + 2)
+    found = solve(np.tile([1.0, 2.0, 3.0, 4.0], (10, 1)), counts, 20 + 3 * 4 + 2)
     assert found.cut.tolist() == [2] * 4 + [1] * 6
     assert found.k.sum() == 20 + 3 * 4
 
 
 def test_one_that_does_not_fit_ends_it_for_those_behind_though_they_would_fit() -> None:
-    # Equal prices: b (M + N) / 2 - b - a of a bin of 4 fragments and, with another a, of one of 1.
-    counts, fall_ = np.array([[4, 0, 0, 0], [4, 0, 0, 0], [1, 0, 0, 0]]), np.ones(3)
-    found = solve(np.array([0.0, 0.0, -1.5]), fall_, counts, 5)
-    assert found.k.tolist() == [4, 0, 0]
+    counts = np.array([[4, 0, 0, 0], [4, 0, 0, 0], [1, 0, 0, 0]])
+    assert solve(np.full((3, 4), 2.0), counts, 5).k.tolist() == [4, 0, 0]
+
+
+def test_a_bin_is_not_worth_less_than_those_in_front_of_it_and_an_empty_one_does_not_count() -> None:
+    prices = np.array([[5.0, 1.0, 9.0, 6.0]], dtype=np.float32)
+    assert ranks_of(prices, np.array([[1, 1, 0, 1]])).tolist() == [[72, 72, 72, 80]]
+    assert ranks_of(prices, np.array([[0, 1, 1, 0]])).tolist() == [[0, 40, 104, 104]]
 
 
 def test_what_is_nan_comes_after_all_others() -> None:
-    a, b = np.array([NAN, -8.0, -1e9, INF]), np.array([0.5, 0.5, NAN, 2.0])
+    prices = np.repeat(np.array([NAN, 8.0, NAN, -INF])[:, None], 4, axis=1)
     counts = np.tile([2, 1, 3, 3], (4, 1))
     for budget in (9, 18):
-        k = solve(a, b, counts, budget).k
+        k = solve(prices, counts, budget).k
         assert k[0] == k[2] == 0
         assert k.sum() == budget
-    assert solve(a, b, counts, 36).k.tolist() == [9, 9, 9, 9]
+    assert solve(prices, counts, 36).k.tolist() == [9, 9, 9, 9]
 
 
 def test_without_importance_a_pixel_comes_last() -> None:
-    w = np.array([NAN, 0.9, 1e-13, 0.0, 1e-35])
-    found = solve(*importance_curve(w), np.tile([1] * 8, (5, 1)), 16)
-    assert found.k.tolist() == [0, 8, 8, 0, 0]
+    w, counts = np.array([NAN, 0.9, 1e-13, 0.0, 0.8], dtype=np.float32), np.tile([1] * 8, (5, 1))
+    found = solve(importance_prices(w, counts), counts, 16)
+    assert found.k.tolist() == [0, 8, 0, 0, 8]
 
 
-@given(st.floats(0.0009765625, 1.0, width=32), st.integers(1, 100))
-def test_importances_ask_for_fragments_in_proportion(w: float, k: int) -> None:
-    a, b = (float(each[0]) for each in importance_curve(np.array([w])))
-    # Cut k - 1 becomes k at t = b (k - 1.5) - a = k / w: as Eq. 3 with a scale t does.
-    assert b * (k - 1.5) - a == pytest.approx(k / w, rel=1e-6)
+@given(st.floats(0.0009765625, 1.0, width=32), st.lists(st.integers(1, 9), min_size=4, max_size=8))
+def test_importances_ask_for_fragments_in_proportion(w: float, row: list[int]) -> None:
+    prices = importance_prices(np.array([w], dtype=np.float32), np.array([row]))[0]
+    # Eq. 3 with a scale t asks for floor(t w): the middle of a bin is the nearest whole number to t w - 1/2.
+    middle = np.cumsum(row) - np.array(row) / 2.0
+    np.testing.assert_allclose(np.exp(prices / 2.0) * w - 0.5, middle, rtol=1e-4)
 
 
-@given(st.floats(-(2.0**59), 2.0**59, width=32), st.floats(2.0**-12, 2.0**59, width=32))
-def test_what_a_trained_network_answers_is_within_the_limits_as_it_is(a: float, b: float) -> None:
-    kept = within_limits(np.array([a]), np.array([b]))
-    assert (kept[0][0], kept[1][0]) == (np.float32(a), np.float32(b))
+@given(st.lists(st.integers(0, 255), min_size=11, max_size=11), st.floats(0.0, 200.0, width=32))
+def test_what_the_tail_tells_is_finite_and_falls_behind_what_covers(steps: list[int], optical_depth: float) -> None:
+    front = np.concatenate([[0.0], np.sort(steps) / 255.0, [1.0]]).astype(np.float32)[None]
+    ones = np.ones((1, 12), np.int64)
+    prior = prior_gains(front, np.array([optical_depth], np.float32), ones, TAILS[DEFAULT_TAIL])
+    assert np.isfinite(prior).all()
+    assert (prior >= LEAST_PRIOR).all()
+    # More fragments that cover as much are worth less each, but that one alone is in its place.
+    few, many = (
+        prior_gains(front, np.array([optical_depth], np.float32), n * ones, TAILS[DEFAULT_TAIL]) for n in (2, 7)
+    )
+    assert (many <= few).all()
 
 
-@pytest.mark.parametrize("a", [NAN, INF, -INF, 3e38])
-@pytest.mark.parametrize("b", [NAN, INF, 0.0, -1.0])
-def test_whatever_a_network_answers_is_within_the_limits(a: float, b: float) -> None:
-    kept = within_limits(np.array([a]), np.array([b]))
-    assert abs(kept[0][0]) <= MOST_GAIN
-    assert LEAST_FALL <= kept[1][0] <= MOST_FALL
+def test_the_prior_is_what_its_formula_says() -> None:
+    front, counts = np.array([[0.0, 0.25, 0.25, 1.0]], np.float32), np.array([[1, 0, 3]])
+    tail = replace(TAILS[DEFAULT_TAIL], bins=3)
+    found = prior_gains(front, np.array([2.0], np.float32), counts, tail)[0]
+    alone = math.log(1.0 - math.exp(-0.5)) + math.log(2.0 * 0.5 / 255.0)
+    assert found[0] == pytest.approx(2.0 * alone, rel=1e-6)
+    assert found[2] == pytest.approx(2.0 * math.log(1.0 - math.exp(-1.5)) - 1.0 - math.log(3.0), rel=1e-6)
+
+
+@pytest.mark.parametrize("bad", [NAN, INF, -INF, 3e38])
+def test_whatever_a_network_answers_has_a_rank(bad: float) -> None:
+    answers = np.full((1, 13), bad, dtype=np.float32)
+    prices = gain_prices(answers, np.full((1, 12), -3.0, dtype=np.float32))
+    ranks = ranks_of(prices, np.ones((1, 12), np.int64))
+    assert ((ranks == 0) | (ranks == RANKS - 1)).all()
 
 
 def test_a_frame_without_fragments_has_no_core() -> None:
-    found = solve(np.zeros(3), np.ones(3), np.zeros((3, 8), np.int64), 5)
+    found = solve(np.zeros((3, 8)), np.zeros((3, 8), np.int64), 5)
     assert (found.k.tolist(), found.cut.tolist(), found.rank) == ([0] * 3, [0] * 3, None)

@@ -75,10 +75,12 @@ def test_an_exponent_is_off_by_its_own_bin_and_the_steps_of_shares_at_most(
     optical = optical_of(pixel)
     found = reference.binned_exponents(pixel, optical, row)
     bins = reference.depth_bins(pixel, optical, row).bin
+    # A full bin holds no more: behind it nothing is visible.
+    held = np.minimum(np.bincount(bins, optical, row.bins), BIN_LIMIT / OPTICAL_UNIT)
     # A step of the shares, what whole units cannot say, and all that is in the fragment's own bin.
-    step, units = optical.sum() / row.share_levels, (pixel.n + 1) / OPTICAL_UNIT
+    step, units = held.sum() / row.share_levels, (pixel.n + 1) / OPTICAL_UNIT
     for i, b in enumerate(bins):
-        before, own = optical[bins < b].sum(), optical[bins == b].sum()
+        before, own = held[:b].sum(), held[b]
         assert before - step - units <= found[i] <= before + own + 2.0 * step + 2.0 * units
 
 
@@ -124,7 +126,8 @@ def test_what_lies_outside_of_a_range_counts_as_at_its_end(tail: TailName, given
 
 def test_no_stored_alpha_is_near_half_a_unit() -> None:
     units = depth_bins.OPTICAL[1:255] * OPTICAL_UNIT
-    assert np.abs(units - np.floor(units) - 0.5).min() > 0.01
+    # A float32 logarithm is off by less than 1e-6 of itself: of 1,401 units, by a thousandth and a half.
+    assert np.abs(units - np.floor(units) - 0.5).min() > 0.004
     assert (depth_bins.UNITS[1:] >= 1.0).all()
     assert depth_bins.UNITS[0] == 0.0
 

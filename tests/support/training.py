@@ -39,9 +39,9 @@ from trainer.paper import with_paper_inputs
 from trainer.weights import Layer, Weights
 
 
-def random_view(asset: str, seed: int, size: int = 40, max_n: int = 12) -> ViewData:
+def random_view(asset: str, seed: int, size: int = 40, max_n: int = 12, alpha: float | None = None) -> ViewData:
     """Every pixel of a random dump with fragments; scored at 1/4 and 1/2 of its fragments."""
-    dump = random_dump(size, size, max_n, seed)
+    dump = random_dump(size, size, max_n, seed, alpha)
     curves = whole_bins(dump, error_curves(dump))
     hulls = lower_hulls(curves)
     budgets = [dump.total // 4, dump.total // 2]

@@ -1,7 +1,7 @@
 // What a pixel with a choice remembers of the last frame: one word, from the lowest bits on. Constants and a plain twin:
 // renderer/reference/temporal.py.
 //   8  correction of its bins' ranks, around ZERO: of their log gain, PRICE_STEPS a unit
-//   8  log gain of its last core fragment as it was seen, SEEN_STEPS a unit above SEEN_LEAST
+//   8  log gain of each fragment of its last core bin as it was seen, SEEN_STEPS a unit above SEEN_LEAST
 //   6  its cut when that was seen; 0: it was not
 //   4  frames that have corrected it, at most FRAMES
 //   6  its n, at most MOST_KNOWN

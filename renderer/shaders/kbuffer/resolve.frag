@@ -1,7 +1,7 @@
 #version 450
 // Core front to back, then the tail, then the background (METHOD 2). Linear RGB out.
 // TAIL: -1 none (the pool holds every fragment), else a kind of schemas/tail.py. STRIDE: words of a slot; the first is the colour.
-// RUNS: of whole bins (common/bin_words.glsl). OBSERVE: also note what the last core fragment changed (kbuffer-temporal/observe.glsl).
+// RUNS: of whole bins (common/bin_words.glsl). OBSERVE: also note what the last bin of the core changed (kbuffer-temporal/observe.glsl).
 #include "common/composite.glsl"
 uniform int width;
 #ifdef OBSERVE
@@ -57,13 +57,21 @@ void main() {
     ivec2 xy = ivec2(gl_FragCoord.xy);
     int p = (xy.y - first_row) * width + xy.x;
     vec4 light = vec4(0.0, 0.0, 0.0, 1.0);
-    vec4 without_last = light;
     uint begin = run_begin(uint(p)), end = run_end(uint(p)), i = begin;
+#ifdef OBSERVE
+    vec4 without_last = light;
+    uint first = begin;
+#endif
     for (; i < end; ++i) {
         uint word = pool_word(slot_at(i));
         if (word == EMPTY) break;  // the pixel has fewer fragments than slots
-        without_last = light;
         add_behind(word, light);
+#ifdef OBSERVE
+        if (is_before_last(p, i)) {
+            without_last = light;
+            first = i + 1u;
+        }
+#endif
     }
     vec3 behind = texelFetch(background, xy, 0).rgb;
     behind *= behind;
@@ -77,7 +85,7 @@ void main() {
 #endif
     vec3 seen = composed(light, sums, opacity, behind);
 #ifdef OBSERVE
-    if (i > begin) observe(p, i - 1u, seen, without_last, sums, opacity, behind);
+    if (i > begin) observe(p, first, i, seen, without_last, sums, opacity, behind);
 #endif
     out_colour = vec4(seen, 1.0);
 }

@@ -78,8 +78,8 @@ def test_costs_are_those_of_the_frame() -> None:
     full = network_cost(random_weights(1, FEATURES, (8,)), "binned-12")
     assert (lean.early_bytes, full.early_bytes) == (58, 62)
     assert lean.free_slots == full.free_slots == 2
-    assert [full.peak_bytes(m) for m in (0.125, 1.0, 4.0)] == [76, 76, 60 + 32]
-    # No means are gathered: curves, which lie beside what is kept, decide.
+    assert [full.peak_bytes(m) for m in (0.125, 1.0, 4.0)] == [62, 62, 62 + 32], "in the words, or beside all"
+    # A word for each bin, with or without means.
     assert network_cost(random_weights(1, ("log_n",), (8,)), "density-16").early_bytes == 64 + 10
 
 

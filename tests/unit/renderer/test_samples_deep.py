@@ -18,6 +18,8 @@ from renderer.samples.deep import DEEP
 from renderer.scene import load_scene
 from schemas.scene import SceneArrays
 
+pytestmark = pytest.mark.dear
+
 DEPTHS = {
     "anatomy": 8.7,
     "fur": 8.6,

@@ -22,7 +22,7 @@ def test_a_secret_opens_and_is_stored_nowhere(database_url: str) -> None:
     assert keys.any()
     with database.read() as connection:
         row = dict(connection.execute(sa.select(tables.keys)).mappings().one())
-    assert secret.rpartition("_")[2] not in str(row)
+    assert secret.split("_", 2)[2] not in str(row)
 
 
 @pytest.mark.parametrize("change", ["", "dia_", "x", "dia_000000000000_" + "a" * 43, "\udcff", "a\0b"])

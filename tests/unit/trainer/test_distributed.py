@@ -50,6 +50,7 @@ def largest_difference(one: Weights, two: Weights) -> float:
     return max(float(np.abs(x - y).max() / np.abs(x).max()) for x, y in pairs)
 
 
+@pytest.mark.dear
 def test_two_processes_train_what_one_does(dataset: Path, alone: Weights, tmp_path: Path) -> None:
     # Five groups: one process has three of them, the other two.
     assert largest_difference(alone, together(dataset, tmp_path, CONFIG)) < 1e-4
@@ -59,6 +60,7 @@ def test_two_processes_train_what_one_does(dataset: Path, alone: Weights, tmp_pa
     assert largest_difference(alone, other) > 1e-2
 
 
+@pytest.mark.dear
 def test_two_processes_continue_from_the_checkpoint_of_one(dataset: Path, alone: Weights, tmp_path: Path) -> None:
     class Killed(Exception):
         pass

@@ -24,12 +24,14 @@ from trainer.train import TrainConfig, TrainResult, stopping_assets, train
 from trainer.weights import Weights
 
 CONFIG = TrainConfig(steps=60, batch=4 * GROUP, validate_every=20, threads=1)
+EVEN = 0.33
+"""Opacity of all fragments: with random ones a few pixels decide a score, and it says nothing of others."""
 EVERY_STEP = {"checkpoint_seconds": 1e-9}
 
 
 @pytest.fixture(scope="module")
 def data() -> tuple[list[ViewData], list[ViewData]]:
-    return [random_view("a", 1), random_view("b", 2)], [random_view("c", 3)]
+    return [random_view("a", 1, alpha=EVEN), random_view("b", 2, alpha=EVEN)], [random_view("c", 3, alpha=EVEN)]
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +46,7 @@ def assert_same(one: Weights, two: Weights) -> None:
 
 
 def test_training_comes_nearer_to_the_optimum(data: tuple[list[ViewData], list[ViewData]]) -> None:
-    trained = train(*data, CONFIG.model_copy(update={"steps": 200, "validate_every": 100}))
+    trained = train(*data, CONFIG.model_copy(update={"steps": 400, "validate_every": 100}))
     untrained = train(*data, CONFIG.model_copy(update={"steps": 1, "validate_every": 1}))
     excess = [geometric_mean(evaluate(found.weights, data[1])) - 1.0 for found in (trained, untrained)]
     assert excess[0] < 0.7 * excess[1]
@@ -127,7 +129,7 @@ def test_features_that_never_change_are_not_read(
     for view in views:
         view.features[:, FEATURES.index("luma_mean")] = 0.33
     weights = train(views, data[1], CONFIG.model_copy(update={"steps": 1})).weights
-    assert set(result.weights.features) - set(weights.features) == {"depth_mean"}
+    assert set(result.weights.features) - set(weights.features) == {"luma_mean"}
 
 
 def test_evaluation_is_exact_for_a_predictor_that_knows_the_hull() -> None:
@@ -170,8 +172,9 @@ def test_assets_to_stop_by_are_whole_and_a_share_of_all(assets: str, count: int)
     assert chosen == stopping_assets(sorted(assets, reverse=True), 5, seed=3)
 
 
+@pytest.mark.dear
 def test_replayed_assets_are_not_forgotten() -> None:
-    old, new = [random_view("old", 1)], [random_view("new", 2)]
+    old, new = [random_view("old", 1, alpha=EVEN)], [random_view("new", 2, alpha=EVEN)]
     new[0].features[:] *= -1.0  # the same curves, said in other words
     began = train(old, (), CONFIG.model_copy(update={"steps": 1200, "validate_every": 100}))
     config = CONFIG.model_copy(update={"steps": 1200, "validate_every": 1200})

@@ -2,8 +2,8 @@ import { expect, it } from "vitest";
 
 import { blocksOf, budgetOf } from "../src/passes/allocation";
 import { runsOf, widened } from "../src/passes/geometry";
-import { CONSTANTS, TAILS } from "../src/generated";
-import { BLOCK, CEILING, shader } from "../src/shaders";
+import { TAILS } from "../src/generated";
+import { BLOCK, CEILING } from "../src/shaders";
 import { DEFAULT_TAIL, FINEST_TAIL, tailOf } from "../src/tail";
 
 it("blocks hold every pixel and the offset behind the last one", () => {
@@ -18,18 +18,11 @@ it("a budget is whole slots below where sums stop", () => {
   expect(budgetOf(1e9, 1e6)).toBe(CEILING - 1);
 });
 
-it("tails are those with bins, and their shaders have their constants", () => {
+it("tails are those with bins", () => {
   const binned = Object.keys(TAILS).filter((name) => tailOf(name) !== null);
   expect(binned).toEqual(Object.keys(TAILS).filter((name) => TAILS[name]!.kind === "BINNED"));
-  for (const name of binned) {
-    const text = shader([], tailOf(name)!);
-    expect(text).toContain(`const BINS = ${TAILS[name]!.bins}u;`);
-    expect(text).toContain(`const MEAN_LEVELS = ${TAILS[name]!.meanLevels};`);
-    for (const [constant, value] of Object.entries(CONSTANTS)) expect(text).toContain(`const ${constant} = ${value};`);
-  }
   expect(tailOf("toString")).toBeNull();
   expect(DEFAULT_TAIL.bins).toBeLessThan(FINEST_TAIL.bins);
-  expect(() => shader(["nothing"])).toThrow();
 });
 
 it("a camera for whole tiles has the picture in its upper left", () => {

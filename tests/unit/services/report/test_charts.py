@@ -1,7 +1,9 @@
-"""Charts: round ticks, a true Pareto front, well-formed SVG, and points where the values are."""
+"""Charts: round ticks, a true Pareto front, and points where a reader, by the ticks, finds the values."""
 
 from __future__ import annotations
 
+import math
+import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 
@@ -10,9 +12,53 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support.measured import example, measurement
 
-from schemas.measurement import TrainingPoint
+from schemas.measurement import Measurement, TrainingPoint
 from services.report import charts
 from services.summary import rows
+
+
+class Read:
+    """A chart as a reader has it: the values of its ticks, between which everything else lies.
+
+    Args:
+        text: SVG of the chart.
+        log: Whether its axes are logarithmic.
+    """
+
+    def __init__(self, text: str, log: bool) -> None:
+        self.svg = ElementTree.fromstring(text)
+        self._log = log
+        ticks = [element for element in self.svg.iter("text") if element.get("class") == "tick"]
+        across, up = ([one for one in ticks if one.get("text-anchor") == anchor] for anchor in ("middle", "end"))
+        self._x = [(self._scale(float(one.text or "")), float(one.get("x", ""))) for one in across]
+        # A label's baseline is four units below its line.
+        self._y = [(self._scale(float(one.text or "")), float(one.get("y", "")) - 4) for one in up]
+
+    def _scale(self, value: float) -> float:
+        return math.log(value) if self._log else value
+
+    def values(self, line: ElementTree.Element) -> list[tuple[float, float]]:
+        """What the corners of a line stand for."""
+        corners = [pair.split(",") for pair in (line.get("points") or "").split()]
+        return [(self._value(float(x), self._x), self._value(float(y), self._y)) for x, y in corners]
+
+    def _value(self, place: float, ticks: list[tuple[float, float]]) -> float:
+        (low, start), (high, end) = ticks[0], ticks[-1]
+        scaled = low + (place - start) / (end - start) * (high - low)
+        return math.exp(scaled) if self._log else scaled
+
+    def lines(self, css: str) -> list[ElementTree.Element]:
+        """Those of a class."""
+        return [line for line in self.svg.iter("polyline") if line.get("class") == css]
+
+
+def marked(group: ElementTree.Element) -> list[tuple[float, float]]:
+    """Centres of the marks of a technique, in SVG units."""
+    found = [(float(mark.get("cx", "")), float(mark.get("cy", ""))) for mark in group.iter("circle")]
+    for mark in group.iter("polygon"):
+        x, y = zip(*([float(one) for one in pair.split(",")] for pair in mark.get("points", "").split()), strict=True)
+        found.append(((min(x) + max(x)) / 2, (min(y) + max(y)) / 2))
+    return found
 
 
 @given(st.floats(1e-6, 1e6), st.floats(1.1, 1e9))
@@ -51,20 +97,25 @@ def test_the_pareto_front_is_what_nothing_dominates(points: list[tuple[int, int]
     assert charts.pareto_front(points) == sorted({p for p in points if not dominated(p)})
 
 
-def test_the_scatter_has_a_point_for_every_technique_and_budget() -> None:
-    svg = ElementTree.fromstring(charts.error_chart(rows(example()), "bottles"))
-    titles = [element.text for element in svg.iter("title")]
-    assert len(titles) == 8
-    assert "this bundle, F = 2 W H: 20.0 ms, 1.00e-5" in titles
-
-
-def test_lower_error_is_drawn_lower_and_more_time_further_right() -> None:
-    frame = charts.Frame((1.0, 100.0), (0.1, 10.0))
-    assert frame.px(1.0) == frame.left
-    assert frame.px(100.0) == frame.width - frame.right
-    assert frame.py(0.1) == frame.height - frame.bottom
-    assert frame.py(10.0) == frame.top
-    assert frame.px(10.0) == pytest.approx((frame.left + frame.width - frame.right) / 2)
+@pytest.mark.parametrize("measured", [example(), [measurement(scene="bottles & <glass>")]], ids=["many", "one"])
+def test_points_are_where_the_ticks_say_that_their_values_are(measured: list[Measurement]) -> None:
+    read = Read(charts.error_chart(rows(measured), measured[0].scene), log=True)
+    seen = 0
+    for one in {one.technique for one in measured}:
+        (group,) = (group for group in read.svg.iter("g") if group.get("class") == f"t-{one}")
+        (link,) = (line for line in group.iter("polyline") if line.get("class") == "link")
+        own = sorted((each.budget_factor, each.total_ms, each.mse) for each in measured if each.technique == one)
+        found = read.values(link)
+        assert [x for x, _ in found] == pytest.approx([ms for _, ms, _ in own], rel=0.01)
+        assert [y for _, y in found] == pytest.approx([1e5 * mse for *_, mse in own], rel=0.02)
+        places = [tuple(map(float, pair.split(","))) for pair in (link.get("points") or "").split()]
+        assert marked(group) == [pytest.approx(place, abs=1.5) for place in places]
+        told = [re.search(r": ([\d.]+) ms, ([\d.]+)e-5$", title.text or "") for title in group.iter("title")]
+        assert [(float(each[1]), float(each[2])) for each in told if each] == [
+            pytest.approx(value, rel=0.02) for value in found
+        ]
+        seen += len(found)
+    assert seen == len(measured)
 
 
 def test_the_oracle_is_not_on_the_front() -> None:
@@ -73,9 +124,9 @@ def test_the_oracle_is_not_on_the_front() -> None:
         measurement("kbuffer-deep", 2e-5, total_ms=20.0),
         measurement("kbuffer-optimal", 1e-5, total_ms=30.0),
     ]
-    svg = ElementTree.fromstring(charts.error_chart(rows(measured), "bottles"))
-    (front,) = [element for element in svg.iter("polyline") if element.get("class") == "front"]
-    assert len((front.get("points") or "").split()) == 2
+    read = Read(charts.error_chart(rows(measured), "bottles"), log=True)
+    (front,) = read.lines("front")
+    assert read.values(front) == [pytest.approx(point, rel=0.02) for point in ((10.0, 4.0), (20.0, 2.0))]
 
 
 def test_rows_without_times_make_no_scatter() -> None:
@@ -92,16 +143,14 @@ def test_labels_of_neighbours_stand_apart() -> None:
     assert len({(text.get("text-anchor"), text.get("y")) for text in labels}) == len(names)
 
 
-def test_one_point_is_drawn_too() -> None:
-    ElementTree.fromstring(charts.error_chart(rows([measurement()]), "bottles & <glass>"))
-
-
 @pytest.mark.parametrize("losses", [(1.0, 0.5, 0.4), (0.0, 0.0), (1.0, 1.0)])
-def test_the_training_chart_is_well_formed(losses: tuple[float, ...]) -> None:
+def test_the_training_chart_shows_the_error_of_every_step(losses: tuple[float, ...]) -> None:
     history = [TrainingPoint(step=10 * i, loss=loss, over_optimum=2 * loss) for i, loss in enumerate(losses)]
-    svg = ElementTree.fromstring(charts.training_chart(history))
-    lines = list(svg.iter("polyline"))
-    assert [len((line.get("points") or "").split()) for line in lines] == [len(losses)]
+    read = Read(charts.training_chart(history), log=False)
+    (line,) = read.lines("line training")
+    found = read.values(line)
+    assert [x for x, _ in found] == pytest.approx([point.step for point in history], abs=0.1)
+    assert [y for _, y in found] == pytest.approx([point.over_optimum for point in history], abs=0.02)
 
 
 def test_a_training_of_one_point_makes_no_chart() -> None:

@@ -1,4 +1,4 @@
-// `binned`: a binned tail and nothing else, two additive passes (renderer/techniques/binned.py).
+// `binned`: a binned tail and nothing else, an atomic and an additive pass (renderer/techniques/binned.py).
 
 import type { Work } from "../work";
 import { type Binned, TAIL_FILES, tailBuffers, tailTargets } from "./bins";

@@ -1064,6 +1064,10 @@ fn find_range(in: Surface) {
     }
     // Across a silhouette the slope says nothing: no surface falls by a twentieth of its distance within a tile.
     let reach = min(0.5 * slope, 0.05 * depth);
+    // Where a triangle that reaches behind the eye is interpolated beyond its edges; such bits would be the greatest.
+    if (!(depth > 0.0)) {
+        return;
+    }
     let columns = (camera.size.x + RANGE_TILE - 1) / RANGE_TILE;
     let tile = u32(in.position.y) / STEPS * columns + u32(in.position.x) / STEPS;
     atomicMax(&found[2u * tile], ~bitcast<u32>(depth - reach));

@@ -1,5 +1,5 @@
-// What a page shows, in the order of the document: texts, pictures, charts and controls, each with its box in pixels of the
-// whole page. Any browser says the same of the same page, but for a few pixels.
+// What a page shows, in the order of the document: texts, pictures, charts and controls. Any browser says the same of the
+// same page, in any window.
 () => {
   const clean = (text) => text.replace(/\s+/g, " ").trim();
   const told = (element) => {
@@ -18,8 +18,6 @@
   };
   return [...document.querySelectorAll("body *")].flatMap((element) => {
     const text = element.closest("title") || !element.checkVisibility({ visibilityProperty: true }) ? null : told(element);
-    if (text === null) return [];
-    const box = element.getBoundingClientRect();
-    return [[element.localName, clean(text), ...[box.left + scrollX, box.top + scrollY, box.width, box.height].map(Math.round)]];
+    return text === null ? [] : [`${element.localName} ${clean(text)}`.trim()];
   });
 }
