@@ -105,7 +105,8 @@ WGSL: Final = Dialect(
     half_prelude=("enable f16;",),
     outputs="const DIAPHANE_OUTPUTS = {n};\nstruct DiaphaneAnswer {{ y: array<f32, DIAPHANE_OUTPUTS> }}",
     predict="fn diaphane_predict(x: array<f32, DIAPHANE_FEATURES>) -> DiaphaneAnswer {",
-    answer="return DiaphaneAnswer(array<f32, DIAPHANE_OUTPUTS>({values}));",
+    # Not array<f32, ...>: an input may be called f32 there.
+    answer="return DiaphaneAnswer(array({values}));",
 )
 
 

@@ -15,7 +15,7 @@ from renderer.frame import Frame
 from renderer.gpu_scene import TRANSPARENT, GpuScene
 from renderer.programs import Defines, expand
 from renderer.techniques import Binned, Budget, KBufferDeep
-from schemas.bundle import GLSL, HeadName, OutputName, ParityReport, Provenance, TailSpec, load_manifest
+from schemas.bundle import GLSL, HeadName, ParityReport, Provenance, TailSpec, load_manifest
 from schemas.fragments import FragmentDump
 from schemas.tail import TailName
 from trainer.bundle import Description, write_bundle
@@ -39,14 +39,10 @@ ROWS: dict[TailName, Defines] = {
     "binned-16": {"BINS": 16, "SHARE_LEVELS": 255, "MEAN_LEVELS": 255},
     "density-16": {"BINS": 16, "SHARE_LEVELS": 15, "MEAN_LEVELS": 0},
 }
-ALLOCATION: Defines = {
-    **{"BLOCK": 2048, "RANKS": 4096, "LEAST_PRICE": -8.0, "DROPPED_BITS": 15},
-    **{"FULL": 255, "MOST_CORE": 1023},
-}
-LIMITS: Defines = {
-    "MOST_GAIN": 1.152921504606847e18,
-    "LEAST_FALL": 0.000244140625,
-    "MOST_FALL": 1.152921504606847e18,
+ALLOCATION: Defines = {"BLOCK": 2048, "RANKS": 256, "FULL": 255, "MOST_CORE": 1023}
+PRICES: Defines = {
+    **{"LEAST_PRICE": -4.0, "PRICE_STEPS": 8.0, "LEAST_PRIOR": -40.0, "LEAST_COVERED": 0.0001},
+    **{"LEAST_ALONE": 0.001, "MOST_ALONE": 0.5, "LEAST_IMPORTANCE": 9.313225746154785e-10},
 }
 ONES = 0xFFFFFFFF
 STATE, FOUND, POOL, BLOCKS, BINS, RANGES = 0, 0, 2, 3, 5, 7
@@ -166,7 +162,7 @@ class Client:
         self.texts = {"bundle/predict.glsl": predict}
         self.gather()
         # 5
-        state, blocks = self.words(16408 // 4, 0), self.words(2 * self.blocks, 7)
+        state, blocks = self.words(1048 // 4, 0), self.words(2 * self.blocks, 7)
         state.write(np.uint32(budget).tobytes())
         shared = {STATE: state, BLOCKS: blocks, BINS: self.found}
         defines: Defines = {**self.tail, **ALLOCATION}
@@ -178,8 +174,8 @@ class Client:
         allocate("totals", self.blocks)
         allocate("complete", 1)
         self.frame.background.use(0)
-        network: Defines = {"TEXELS": 11, "OUTPUTS": outputs, **defines, **LIMITS}
-        self.run("kbuffer-deep/curves.comp", network, {STATE: state, **self.inputs}, self.sixty_fours, **self.size)
+        network: Defines = {"TEXELS": 11, "OUTPUTS": outputs, **defines, **PRICES}
+        self.run("kbuffer-deep/prices.comp", network, {STATE: state, **self.inputs}, self.sixty_fours, **self.size)
         # 6
         allocate("count", self.blocks)
         allocate("choose", 1)
@@ -204,12 +200,7 @@ def test_the_documents_binned_is_the_technique(ctx: moderngl.Context, frame: Fra
 
 
 @pytest.mark.parametrize(
-    ("tail", "head", "outputs"),
-    [
-        ("binned-12", "gain-curve", ("a", "b")),
-        ("binned-16", "gain-curve", ("a", "b", "g")),
-        ("density-16", "importance", ("importance",)),
-    ],
+    ("tail", "head"), [("binned-12", "bin-gains"), ("density-16", "bin-gains"), ("binned-16", "importance")]
 )
 def test_the_documents_frame_is_kbuffer_deep(
     ctx: moderngl.Context,
@@ -218,18 +209,18 @@ def test_the_documents_frame_is_kbuffer_deep(
     tmp_path: Path,
     tail: TailName,
     head: HeadName,
-    outputs: tuple[OutputName, ...],
 ) -> None:
     provenance = Provenance(scenes={}, code_version="0", seed=0, machine="test")
     described = Description("glass", TailSpec(name=tail, g=0.75), "display", provenance, {})
     parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, torch_ubo=0.0, driver="none")
-    network = random_weights(11, head=head, outputs=outputs)
+    network = random_weights(11, head=head, tail=tail)
     write_bundle(tmp_path, network, described, derive(gather(dump, tail)), lambda: parity)
-    luma = int(any(feature.name.startswith("luma_") for feature in load_manifest(tmp_path).features))
+    manifest = load_manifest(tmp_path)
+    luma = int(any(feature.name.startswith("luma_") for feature in manifest.features))
     deep, client = KBufferDeep(tmp_path), Client(frame, tail, luma)
     for budget in (dump.total // 3, dump.total // 2, 100, dump.total + 5):
         expected = deep.render(frame, Budget(budget, tail))
-        linear, k = client.deep(budget, (tmp_path / GLSL).read_text(), len(outputs))
+        linear, k = client.deep(budget, (tmp_path / GLSL).read_text(), len(manifest.outputs))
         np.testing.assert_array_equal(k, expected.k)
         assert k.sum() <= budget
         np.testing.assert_allclose(linear, expected.linear, rtol=0.0, atol=1e-6)

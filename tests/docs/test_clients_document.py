@@ -21,11 +21,11 @@ ROOT = Path(__file__).resolve().parents[2]
 DOCUMENT = (ROOT / "docs" / "CLIENTS.md").read_text(encoding="utf-8")
 FRAME = DOCUMENT.split("## The frame")[1].split("## What to skip")[0]
 
-ALLOCATION = ("BLOCK", "RANKS", "LEAST_PRICE", "DROPPED_BITS", "FULL", "MOST_CORE")
-LIMITS = ("MOST_GAIN", "LEAST_FALL", "MOST_FALL")
+ALLOCATION = ("BLOCK", "RANKS", "FULL", "MOST_CORE")
+PRICES = tuple(name for name in DEFINES if name not in ALLOCATION)
 KINDS = {f"TAIL_{kind.name}": int(kind) for kind in TailKind}
 CONSTANTS: Defines = {
-    **{name: DEFINES[name] for name in (*ALLOCATION, *LIMITS)},
+    **{name: DEFINES[name] for name in (*ALLOCATION, *PRICES)},
     **BIN_CONSTANTS,
     **KINDS,
     **{"TAIL": int(TailKind.BINNED), "MAX_EXPONENT": MAX_EXPONENT, "TEXELS": TEXELS, "DEPTH_UNIT": MOST_OPACITY},
@@ -37,7 +37,9 @@ BINNED = [name for name, tail in TAILS.items() if tail.bins]
 SURFACE: Defines = {"TEXTURED": 0, "MIXED": 1, "WRAPPED": 0, "MORE_UVS": 0, "EMISSIVE": 0}
 """Of the renderer's own surfaces, which a client replaces; `MIXED` is the document's."""
 
-IMPORTANCES = random_weights(1, head="importance", outputs=("importance",))
+IMPORTANCES = random_weights(1, head="importance")
+NETWORKS = {0: IMPORTANCES} | {TAILS[name].bins: random_weights(1, tail=name) for name in BINNED}
+"""Of a tail's bins; 0: of a shader without."""
 
 
 def row(name: TailName) -> Defines:
@@ -57,17 +59,17 @@ COMPILED: list[tuple[str, tuple[str, ...], Defines]] = [
     ("common/weighted_mean.frag", ("DEPTH_UNIT",), {}),
 ]
 for _name in BINNED:
-    _row, _inputs = {**row(_name), "LUMA": 0}, ("TEXELS", *BINS, *ALLOCATION, *LIMITS)
-    _row["PIXEL_WORDS"] = _row["BINS"]
+    _row, _inputs = {**row(_name), "LUMA": 0}, ("TEXELS", *BINS, *ALLOCATION, *PRICES)
+    _row["PIXEL_WORDS"], _gains = _row["BINS"], TAILS[_name].bins + 1
     _luma = {**_row, "LUMA": 1, "PIXEL_WORDS": int(_row["BINS"]) + 1}
     COMPILED += [
         ("gather/bins.frag", BINS, _row),
         ("gather/bins.frag", BINS, _luma),
         ("gather/pack.comp", BINS, _row),
         ("binned/tail.frag", (*BINS, "MAX_EXPONENT"), _row),
-        ("kbuffer-deep/curves.comp", _inputs, {**_luma, "OUTPUTS": 2}),
-        ("kbuffer-deep/curves.comp", _inputs, {**_row, "OUTPUTS": 1}),
-        ("kbuffer-deep/predict.comp", _inputs, {**_luma, "OUTPUTS": 2, "FEATURES_ONLY": 0}),
+        ("kbuffer-deep/prices.comp", _inputs, {**_luma, "OUTPUTS": _gains}),
+        ("kbuffer-deep/prices.comp", _inputs, {**_row, "OUTPUTS": 1}),
+        ("kbuffer-deep/predict.comp", _inputs, {**_luma, "OUTPUTS": _gains, "FEATURES_ONLY": 0}),
         *(
             (file, (*BINS, "MAX_EXPONENT"), {**_luma, "IN_WORDS": pool, **runs})
             for file, runs in (("kbuffer-deep/capture.frag", {}), ("kbuffer/resolve.frag", {"RUNS": 1}))
@@ -111,7 +113,7 @@ def test_every_shader_compiles_with_what_is_defined_there(tmp_path: Path) -> Non
     for number, (name, constants, others) in enumerate(COMPILED):
         defines = {**others, **{constant: CONSTANTS[constant] for constant in constants}}
         surface = SURFACE if name.endswith(".frag") else {}
-        network = IMPORTANCES if defines.get("OUTPUTS") == 1 else random_weights(1)
+        network = IMPORTANCES if defines.get("OUTPUTS") == 1 else NETWORKS[defines.get("BINS", 0)]
         file = tmp_path / f"{number}{Path(name).suffix}"
         file.write_text(expand(name, {**surface, **defines}, {"bundle/predict.glsl": shader_source(network)}))
         files.append(file)
@@ -145,7 +147,7 @@ def bindings(shader: str) -> set[tuple[int, str]]:
         (3, ["gather/bins.frag", "gather/pack.comp", "common/bin_words.glsl", "common/tile_range.glsl"]),
         (4, ["common/bin_words.glsl", "common/tile_range.glsl"]),
         (5, ["allocation/state.glsl", "allocation/bins.glsl", "common/bin_words.glsl"]),
-        (5, ["kbuffer-deep/inputs.glsl", "kbuffer-deep/curves.comp", "common/tile_range.glsl"]),
+        (5, ["kbuffer-deep/inputs.glsl", "kbuffer-deep/prices.comp", "common/tile_range.glsl"]),
         (5, ["allocation/count.comp", "allocation/blocks.comp", "allocation/scan.comp", "allocation/place.comp"]),
         (7, ["kbuffer-deep/capture.frag", "common/bin_words.glsl", "common/pool.glsl", "common/tile_range.glsl"]),
         (8, ["kbuffer-deep/sort.comp", "common/bin_words.glsl", "common/pool.glsl"]),

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from support.dumps import random_dump
 from support.training import random_weights
 
-from renderer.allocation.cuts import Cuts, events_of, importance_curve, solve_cuts
-from renderer.features import FEATURES, derive, gather
+from renderer.allocation.cuts import Cuts, events_of, solve_cuts
+from renderer.allocation.prices import gain_prices, importance_prices, prior_gains, ranks_of
+from renderer.features import FEATURES, SUMS, derive, gather
 from schemas.bundle import MANIFEST, UBO_DATA, WEIGHTS, WGSL, ParityReport, Provenance, TailSpec, file_spec
 from schemas.tail import TAILS, TailName
 from trainer.bundle import Description, load_bundle, write_bundle
@@ -35,9 +36,9 @@ pytestmark = pytest.mark.skipif(
 
 NETWORKS: dict[str, tuple[Weights, TailName]] = {
     "default": (random_weights(1), "binned-12"),
-    "importance": (random_weights(2, FEATURES[:12], (128, 64), "importance", ("importance",)), "binned-16"),
-    "g": (random_weights(3, FEATURES[3:30], (64, 32), outputs=("a", "b", "g")), "density-16"),
-    "linear": (random_weights(4, FEATURES[:3], ()), "binned-8"),
+    "importance": (random_weights(2, FEATURES[:12], (128, 64), "importance"), "binned-16"),
+    "density": (random_weights(3, FEATURES[3:30], (64, 32), tail="density-16"), "density-16"),
+    "linear": (random_weights(4, FEATURES[:3], (), tail="binned-8"), "binned-8"),
 }
 
 
@@ -122,39 +123,66 @@ def test_features_that_are_not_finite_have_no_answer(
     assert probe("predict", bundles["default"], tmp_path / "rows", tmp_path / "answers") == "refused 1\nrefused 3\n"
 
 
-Problem = tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.uint8]]
+@pytest.mark.parametrize("name", NETWORKS)
+def test_ranks_are_those_of_the_renderer(
+    bundles: dict[str, Path], probe: Callable[..., str], tmp_path: Path, name: str
+) -> None:
+    weights, tail = NETWORKS[name]
+    dump, bins = random_dump(40, 40, 12, seed=1), TAILS[tail].bins
+    rng, sums = np.random.default_rng(7), gather(dump, tail)[dump.counts > 0]
+    counts = np.minimum(rng.poisson(0.8, (len(sums), bins)), 255).astype(np.uint8)
+    answers = rng.normal(-2.0, 3.0, (len(sums), len(weights.outputs))).astype(np.float32)
+    answers[:, -1] = rng.random(len(sums))
+    extremes = [np.nan, 0.0, 1.0] if weights.head == "importance" else [np.nan, np.inf, -np.inf, 3e38, 0.0]
+    answers[:40] = rng.choice(np.array(extremes, np.float32), answers[:40].shape)
+    np.concatenate([answers, sums], axis=1).tofile(tmp_path / "rows")
+    counts.tofile(tmp_path / "counts")
+    assert probe("ranks", bundles[name], tmp_path / "rows", tmp_path / "counts", tmp_path / "ranks") == ""
+    found = np.fromfile(tmp_path / "ranks", np.uint8).reshape(counts.shape)
+    if weights.head == "importance":
+        expected = ranks_of(importance_prices(answers[:, 0], counts), counts)
+    else:
+        first, depth = SUMS.index("front_1"), sums[:, SUMS.index("optical_depth")]
+        front = np.ones((len(sums), bins + 1), np.float32)
+        front[:, 0], front[:, 1:-1] = 0.0, sums[:, first : first + bins - 1]
+        prior = prior_gains(front, depth, counts, TAILS[tail])
+        expected = ranks_of(gain_prices(answers, prior), counts)
+    apart = np.abs(found.astype(int) - expected)
+    assert apart.max() <= 1
+    assert np.count_nonzero(apart) <= 1e-3 * apart.size  # logarithms that are next to a step
+    assert np.mean((expected > 0) & (expected < 255)) > 0.3
+
+
+Problem = tuple[NDArray[np.uint8], NDArray[np.uint8]]
 
 
 def cuts_of(probe: Callable[..., str], folder: Path, problem: Problem, budget: int) -> tuple[Cuts, int]:
     """What the client finds, and the sum that it says."""
-    pixels, bins = problem[2].shape
-    (folder / "curves").write_bytes(b"".join(part.tobytes() for part in problem))
-    complete, rank, total = map(int, probe("cuts", pixels, bins, budget, folder / "curves", folder / "cuts").split())
+    pixels, bins = problem[1].shape
+    (folder / "ranks").write_bytes(b"".join(part.tobytes() for part in problem))
+    complete, rank, total = map(int, probe("cuts", pixels, bins, budget, folder / "ranks", folder / "cuts").split())
     cut, k = np.fromfile(folder / "cuts", np.int32).reshape(2, -1)
     return Cuts(cut, k, None if complete else rank), total
 
 
-def curves(seed: int, spread: float, most: int, bins: int = 12) -> Problem:
+def ranked(seed: int, ranks: tuple[int, int], most: int, bins: int = 12) -> Problem:
+    """Pixels of up to `most` fragments a bin, with ranks between two."""
     rng = np.random.default_rng(seed)
     counts = rng.integers(0, most, (3000, bins)) * (rng.random((3000, bins)) < 0.4)
-    a, b = rng.normal(-8.0, spread, len(counts)), 0.02 + rng.exponential(0.3, len(counts))
-    return a.astype(np.float32), b.astype(np.float32), np.minimum(counts, 255).astype(np.uint8)
-
-
-OVERFLOWED = curves(5, 3.0, 9)
-OVERFLOWED[0][:6], OVERFLOWED[1][2:8] = (np.nan, np.inf, -np.inf, 0.0, np.nan, 1e30), (np.nan, np.inf, 1e-9, 1, 1, 1)
+    drawn = np.sort(rng.integers(*ranks, counts.shape, endpoint=True), axis=1)
+    return drawn.astype(np.uint8), np.minimum(counts, 255).astype(np.uint8)
 
 
 @pytest.mark.parametrize(
     "problem",
     [
-        pytest.param(curves(1, 3.0, 4), id="usual"),
-        pytest.param(curves(2, 0.0, 2, bins=16), id="ties"),
-        pytest.param(curves(3, 1e30, 40, bins=8), id="steep"),
-        pytest.param(curves(4, 3.0, 300), id="deep"),
-        pytest.param(OVERFLOWED, id="overflowed"),
-        pytest.param(tuple(x[:1] for x in curves(6, 1.0, 9)), id="one pixel"),
-        pytest.param((*curves(7, 1.0, 9)[:2], np.zeros((3000, 8), np.uint8)), id="empty"),
+        pytest.param(ranked(1, (0, 255), 4), id="usual"),
+        pytest.param(ranked(2, (100, 100), 2, bins=16), id="ties"),
+        pytest.param(ranked(3, (254, 255), 40, bins=8), id="late"),
+        pytest.param(ranked(4, (0, 255), 300), id="deep"),
+        pytest.param(ranked(5, (0, 0), 9), id="early"),
+        pytest.param(tuple(x[:1] for x in ranked(6, (0, 255), 9)), id="one pixel"),
+        pytest.param((ranked(7, (0, 255), 9, 8)[0], np.zeros((3000, 8), np.uint8)), id="empty"),
     ],
 )
 def test_cuts_are_those_of_the_shaders_twin(probe: Callable[..., str], tmp_path: Path, problem: Problem) -> None:
@@ -167,14 +195,6 @@ def test_cuts_are_those_of_the_shaders_twin(probe: Callable[..., str], tmp_path:
         np.testing.assert_array_equal(found.k, expected.k)
         assert found.rank == expected.rank
         assert total == found.k.sum() <= budget
-
-
-def test_curves_of_importances_are_those_of_the_renderer(probe: Callable[..., str], tmp_path: Path) -> None:
-    importances = np.array([0.0, 1e-30, 0.1, 0.5, 1.0, np.nan], np.float32)
-    importances.tofile(tmp_path / "importances")
-    probe("importances", tmp_path / "importances", tmp_path / "curves")
-    found = np.fromfile(tmp_path / "curves", np.float32).reshape(-1, 2)
-    np.testing.assert_array_equal(found, np.stack(importance_curve(importances), axis=1))
 
 
 # What is wrong with a bundle -> what the reader says.
@@ -233,7 +253,9 @@ DAMAGED: dict[str, tuple[Damage, str]] = {
     "tail": (set_to("density-32", "tail", "name"), "tail"),
     "tail without bins": (set_to("density", "tail", "name"), "without depth bins"),
     "head": (set_to("gain", "head"), "head"),
-    "outputs": (set_to(["b", "a"], "outputs"), "outputs"),
+    "outputs": (set_to(["prior"], "outputs"), "outputs"),
+    "order": (edit(lambda manifest: manifest["outputs"].reverse()), "outputs"),
+    "another tail's outputs": (set_to("binned-8", "tail", "name"), "outputs"),
     "feature": (set_to("colour", "features", 0, "name"), "feature 0"),
     "feature twice": (set_to("log_n", "features", 1, "name"), "feature 1"),
     "no features": (set_to([], "features"), "features"),

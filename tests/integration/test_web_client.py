@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import io
-import shutil
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +27,7 @@ from renderer.samples.glb import HOME
 from renderer.scene import load_scene
 from renderer.techniques import Binned, Budget, KBuffer, KBufferDeep, SBuffer, Technique, WeightedBlended
 from renderer.views import framing_view
-from schemas.bundle import MANIFEST, ParityReport, Provenance, TailSpec
+from schemas.bundle import HeadName, ParityReport, Provenance, TailSpec
 from schemas.colour import display8
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, TailName
 from services.dashboard import SESSION_ANSWERS, demo
@@ -60,21 +58,21 @@ def frame(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Fra
 
 @pytest.fixture(scope="module")
 def bundles(frame: Frame, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A bundle for every tail, with the same network, that for the default tail `glass`; and one of importances."""
-    first = tmp_path_factory.mktemp("bundle")
+    """A bundle for every tail, that for the default tail `glass`; and one of importances."""
     provenance = Provenance(scenes={}, code_version="0", seed=0, machine="test")
-    described = Description("glass", TailSpec(name=DEFAULT_TAIL, g=0.75), "display", provenance, {})
     parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, torch_ubo=0.0, driver="none")
-    features = derive(gather(capture(frame).dump, DEFAULT_TAIL))
-    manifest = write_bundle(first, random_weights(11), described, features, lambda: parity)
-    made = {"glass": first, "importance": tmp_path_factory.mktemp("importance")}
-    importances = random_weights(11, head="importance", outputs=("importance",))
-    write_bundle(made["importance"], importances, replace(described, name="importance"), features, lambda: parity)
-    for tail in OTHER_TAILS:
-        made[tail] = tmp_path_factory.mktemp("bundles") / tail
-        shutil.copytree(first, made[tail])
-        other = manifest.model_copy(update={"name": tail, "tail": TailSpec(name=tail, g=0.75)})
-        (made[tail] / MANIFEST).write_text(other.model_dump_json(), encoding="utf-8")
+    dump = capture(frame).dump
+    names: dict[str, tuple[TailName, HeadName]] = {
+        **{tail: (tail, "bin-gains") for tail in OTHER_TAILS},
+        "glass": (DEFAULT_TAIL, "bin-gains"),
+        "importance": (DEFAULT_TAIL, "importance"),
+    }
+    made = {}
+    for name, (tail, head) in names.items():
+        made[name] = tmp_path_factory.mktemp("bundles") / name
+        described = Description(name, TailSpec(name=tail, g=0.75), "display", provenance, {})
+        weights = random_weights(11, head=head, tail=tail)
+        write_bundle(made[name], weights, described, derive(gather(dump, tail)), lambda: parity)
     return made
 
 

@@ -3,8 +3,8 @@
  *     check FOLDER...                 a line for each: "ok", name and self-test, or what is wrong
  *     predict FOLDER IN OUT           rows of features -> rows of answers
  *     features FOLDER IN OUT          rows of raw sums -> rows of features
- *     cuts PIXELS BINS BUDGET IN OUT  a, b (float [PIXELS]), counts (uint8 [PIXELS][BINS]) -> cuts, k; prints the solution
- *     importances IN OUT              rows of an importance -> rows of a and b
+ *     ranks FOLDER IN COUNTS OUT      rows of an answer and raw sums, rows of counts (uint8) -> rows of ranks
+ *     cuts PIXELS BINS BUDGET IN OUT  ranks, counts (uint8 [PIXELS][BINS] each) -> cuts, k; prints the solution
  *     fuzz FOLDER SEED COUNT          damages the manifest and the weights in memory; prints how many were accepted
  */
 #define DIAPHANE_BUNDLE_IMPLEMENTATION
@@ -66,36 +66,46 @@ static void convert(int predicts, char **argv) {
     diaphane_free(&bundle);
 }
 
+static void ranks(char **argv) {
+    DiaphaneBundle bundle;
+    size_t size, width, bins, row, rows;
+    unsigned char *numbers = whole(argv[1], &size), *counts = whole(argv[2], &rows);
+    const float *input = (const float *)(void *)numbers;
+    uint8_t *found;
+    if (!diaphane_load(&bundle, argv[0], &error)) stop(error.text);
+    width = (size_t)bundle.outputs + DIAPHANE_SUMS;
+    bins = (size_t)bundle.bins;
+    rows = size / sizeof *input / width;
+    found = (uint8_t *)allocated(rows * bins);
+    for (row = 0; row < rows; ++row)
+        diaphane_ranks(&bundle, input + row * width, input + row * width + bundle.outputs, counts + row * bins,
+                       found + row * bins);
+    save(argv[3], found, rows * bins);
+    free(numbers);
+    free(counts);
+    free(found);
+    diaphane_free(&bundle);
+}
+
 static void cuts(char **argv) {
     size_t pixels = (size_t)strtoul(argv[0], NULL, 10), bins = (size_t)strtoul(argv[1], NULL, 10), size;
     unsigned char *bytes = whole(argv[3], &size);
-    float *numbers = (float *)allocated(2 * pixels * sizeof *numbers);
-    uint8_t *counts = (uint8_t *)allocated(pixels * bins); /* of exactly this size, for the sanitizer */
+    uint8_t *own = (uint8_t *)allocated(pixels * bins); /* of exactly this size, for the sanitizer */
+    uint8_t *counts = (uint8_t *)allocated(pixels * bins);
     uint32_t *found = (uint32_t *)allocated(2 * pixels * sizeof *found);
     DiaphaneSolution solution;
-    memcpy(numbers, bytes, 8 * pixels);
-    memcpy(counts, bytes + 8 * pixels, pixels * bins);
-    if (!diaphane_cuts(numbers, numbers + pixels, counts, (int)bins, pixels, strtoull(argv[2], NULL, 10), found,
-                       found + pixels, &solution)) {
+    memcpy(own, bytes, pixels * bins);
+    memcpy(counts, bytes + pixels * bins, pixels * bins);
+    if (!diaphane_cuts(own, counts, (int)bins, pixels, strtoull(argv[2], NULL, 10), found, found + pixels, &solution)) {
         printf("refused\n");
     } else {
         printf("%d %d %llu\n", solution.complete, solution.rank, (unsigned long long)solution.total);
         save(argv[4], found, 2 * pixels * sizeof *found);
     }
     free(bytes);
-    free(numbers);
+    free(own);
     free(counts);
     free(found);
-}
-
-static void importances(char **argv) {
-    size_t size, i;
-    float *input = (float *)(void *)whole(argv[0], &size);
-    float *curves = (float *)allocated(2 * size);
-    for (i = 0; i < size / sizeof *input; ++i) diaphane_importance_curve(input[i], &curves[2 * i], &curves[2 * i + 1]);
-    save(argv[1], curves, 2 * size);
-    free(input);
-    free(curves);
 }
 
 static uint64_t state;
@@ -176,7 +186,7 @@ int main(int argc, char **argv) {
     else if (argc == 5 && !strcmp(argv[1], "predict")) convert(1, argv + 2);
     else if (argc == 5 && !strcmp(argv[1], "features")) convert(0, argv + 2);
     else if (argc == 7 && !strcmp(argv[1], "cuts")) cuts(argv + 2);
-    else if (argc == 4 && !strcmp(argv[1], "importances")) importances(argv + 2);
+    else if (argc == 6 && !strcmp(argv[1], "ranks")) ranks(argv + 2);
     else if (argc == 5 && !strcmp(argv[1], "fuzz")) fuzz(argv + 2);
     else return stop("what?");
     return 0;

@@ -40,14 +40,14 @@ enum {
 enum {
     DIAPHANE_MAX_UNITS = 1024,   /* of a layer */
     DIAPHANE_MAX_LAYERS = 9,     /* hidden ones and the last */
-    DIAPHANE_MAX_OUTPUTS = 3,
+    DIAPHANE_MAX_OUTPUTS = DIAPHANE_MOST_BINS + 1,
     DIAPHANE_MAX_FILES = 12,
     DIAPHANE_MAX_MANIFEST_BYTES = 1 << 20,
     DIAPHANE_MAX_FILE_BYTES = 64 << 20
 };
 
-typedef enum { DIAPHANE_GAIN_CURVE, DIAPHANE_IMPORTANCE } DiaphaneHead;
-typedef enum { DIAPHANE_A, DIAPHANE_B, DIAPHANE_G, DIAPHANE_SHARE } DiaphaneOutput; /* SHARE: "importance" */
+/* BIN_GAINS: the gain of each bin, then the weight of what the tail tells. IMPORTANCE: one number. */
+typedef enum { DIAPHANE_BIN_GAINS, DIAPHANE_IMPORTANCE } DiaphaneHead;
 
 typedef struct { char text[256]; } DiaphaneError;
 
@@ -62,8 +62,7 @@ typedef struct {
     int mean_levels;            /* and those of its mean position; 0: it is not kept */
     char metric[24];
     DiaphaneHead head;
-    int outputs;                /* numbers of an answer */
-    DiaphaneOutput output[DIAPHANE_MAX_OUTPUTS];
+    int outputs;                /* numbers of an answer: bins + 1, or 1 */
     int features;               /* inputs of the network */
     int feature[DIAPHANE_FEATURES]; /* which ones, for diaphane_feature_name */
     float mean[DIAPHANE_FEATURES], std[DIAPHANE_FEATURES];
@@ -85,7 +84,7 @@ typedef struct {
 
 typedef struct {
     int complete;               /* all that can be in a core is: nothing was selected */
-    int32_t rank;               /* of the greatest price that all pixels are granted (renderer/allocation/cuts.py) */
+    int32_t rank;               /* the greatest that all pixels are granted (renderer/allocation/cuts.py); -1: none */
     uint64_t total;             /* sum k */
 } DiaphaneSolution;
 
@@ -113,22 +112,26 @@ const char *diaphane_feature_name(int feature);
  * sums: [DIAPHANE_SUMS], x: [bundle->features]. */
 void diaphane_features(const DiaphaneBundle *bundle, const float *sums, float *x);
 
-/* The network's answer: y [bundle->outputs]. 0 if an input is not finite, or the answer. */
+/* The network's answer: y [bundle->outputs]. 0 if it is not finite, or an input is not: then there is none. */
 int diaphane_predict(const DiaphaneBundle *bundle, const float *x, float *y);
 
 /* Whether this machine gives the features and answers that the manifest lists. */
 int diaphane_self_test(const DiaphaneBundle *bundle, DiaphaneError *error);
 
-/* Whole bins of every pixel from its gain curve: cut [pixels], bins in the core, from the nearest; k [pixels], their
- * fragments. sum k <= budget, less by at most one bin of one pixel, and the same to the bit as renderer/shaders/allocation
- * gives. counts: [pixels][bins], fragments in each bin, DIAPHANE_FULL for that many or more. a and b are not read where
- * there are no fragments. What is not finite comes last, as in the shaders: of a pixel without an answer give a = b = NAN,
- * as of one that is to have no core while others can have more. solution may be NULL. 0 if bins are none of a tail. */
-int diaphane_cuts(const float *a, const float *b, const uint8_t *counts, int bins, size_t pixels, uint64_t budget,
-                  uint32_t *cut, uint32_t *k, DiaphaneSolution *solution);
+/* From which price each bin of a pixel is worth its fragments (docs/METHOD.md, section 4): ranks [bundle->bins], whole
+ * steps of the price, not falling from bin to bin. y: the network's answer, in which NaN comes last; NULL: there is
+ * none, and the pixel comes last. sums [DIAPHANE_SUMS]: its raw sums, of which the optical depth and the shares in front
+ * of the bins are read. counts [bundle->bins]: fragments in each bin, DIAPHANE_FULL for that many or more. Logarithms
+ * differ from machine to machine: a price next to a step may get the other rank in a shader. */
+void diaphane_ranks(const DiaphaneBundle *bundle, const float *y, const float *sums, const uint8_t *counts,
+                    uint8_t *ranks);
 
-/* The curve of an importance, the one output of a bundle with the head DIAPHANE_IMPORTANCE. */
-void diaphane_importance_curve(float importance, float *a, float *b);
+/* Whole bins of every pixel from their ranks: cut [pixels], bins in the core, from the nearest; k [pixels], their
+ * fragments. sum k <= budget, less by at most one bin of one pixel, and the same as renderer/shaders/allocation gives
+ * of these ranks. ranks, counts: [pixels][bins]; ranks are not read where there are no fragments, nor where the budget
+ * covers all that can be in a core. solution may be NULL. 0 if bins are none of a tail. */
+int diaphane_cuts(const uint8_t *ranks, const uint8_t *counts, int bins, size_t pixels, uint64_t budget, uint32_t *cut,
+                  uint32_t *k, DiaphaneSolution *solution);
 
 /* SHA-256 of bytes, as 64 hexadecimal digits and a zero. */
 void diaphane_sha256(const void *bytes, size_t size, char hex[65]);
@@ -527,11 +530,14 @@ static const char *const dia__files[DIAPHANE_MAX_FILES] = {
 static float dia__larger(float x, float y) { return x > y ? x : y; }
 
 /* Generated by deploy/client/generate.py: tables */
-enum { DIA__RANKS = 4096, DIA__DROPPED_BITS = 15 };
-static const float dia__least_price = -8.0f;
-static const float dia__most_gain = 1.152921504606847e+18f;
-static const float dia__least_fall = 0.000244140625f;
-static const float dia__most_fall = 1.152921504606847e+18f;
+enum { DIA__RANKS = 256, DIA__OPTICAL_DEPTH = 1, DIA__FRONT = 12 };
+static const float dia__price_steps = 8.0f;
+static const float dia__least_price = -4.0f;
+static const float dia__least_prior = -40.0f;
+static const float dia__least_covered = 0.0001f;
+static const float dia__least_alone = 0.001f;
+static const float dia__most_alone = 0.5f;
+static const float dia__least_importance = 9.313225746154785e-10f;
 
 static const char *const dia__metrics[3] = {
     "display", "linear", "paper"};
@@ -662,19 +668,19 @@ static int dia__read_tail(DiaphaneBundle *bundle, const dia__json *json) {
     return 1;
 }
 
+/* After the tail: how many numbers are answered follows from its bins. */
 static int dia__read_outputs(DiaphaneBundle *bundle, const dia__json *json) {
-    static const char *const gain[] = {"a", "b", "g"};
-    size_t head = dia__member(json, 0, "head"), outputs = dia__member(json, 0, "outputs"), at = outputs + 1, count;
+    size_t head = dia__member(json, 0, "head"), outputs = dia__member(json, 0, "outputs"), at = outputs + 1;
     int i;
-    if (json->value[outputs].kind != DIA__ARRAY) return 0;
-    count = json->value[outputs].count;
-    bundle->head = dia__is(json, head, "importance") ? DIAPHANE_IMPORTANCE : DIAPHANE_GAIN_CURVE;
-    if (bundle->head == DIAPHANE_GAIN_CURVE && !dia__is(json, head, "gain-curve")) return 0;
-    if (bundle->head == DIAPHANE_IMPORTANCE ? count != 1 : count != 2 && count != 3) return 0;
-    bundle->outputs = (int)count;
+    bundle->head = dia__is(json, head, "importance") ? DIAPHANE_IMPORTANCE : DIAPHANE_BIN_GAINS;
+    if (bundle->head == DIAPHANE_BIN_GAINS && !dia__is(json, head, "bin-gains")) return 0;
+    bundle->outputs = bundle->head == DIAPHANE_IMPORTANCE ? 1 : bundle->bins + 1;
+    if (json->value[outputs].kind != DIA__ARRAY || json->value[outputs].count != (size_t)bundle->outputs) return 0;
     for (i = 0; i < bundle->outputs; ++i, at = json->value[at].next) {
-        bundle->output[i] = bundle->head == DIAPHANE_IMPORTANCE ? DIAPHANE_SHARE : (DiaphaneOutput)i;
-        if (!dia__is(json, at, bundle->head == DIAPHANE_IMPORTANCE ? "importance" : gain[i])) return 0;
+        char name[24];
+        snprintf(name, sizeof name, "gain_%d", i);
+        if (i == bundle->outputs - 1) strcpy(name, bundle->head == DIAPHANE_IMPORTANCE ? "importance" : "prior");
+        if (!dia__is(json, at, name)) return 0;
     }
     return 1;
 }
@@ -982,20 +988,17 @@ void diaphane_features(const DiaphaneBundle *bundle, const float *sums, float *x
         x[i] = sums[0] < 0.5f ? 0.0f : dia__feature(bundle->feature[i], sums, 1.0f / sums[1]);
 }
 
-static float dia__activate(DiaphaneOutput output, float v) {
+/* Gains are as they are; the last output is a softplus, or the sigmoid of an importance. */
+static float dia__activate(DiaphaneHead head, float v) {
     float small = expf(-fabsf(v)); /* so that nothing overflows */
-    switch (output) {
-        case DIAPHANE_A: return v;
-        case DIAPHANE_B: return (v > 0.0f ? v : 0.0f) + log1pf(small) + 0.02f;
-        case DIAPHANE_G: return 2.0f * (v < 0.0f ? small : 1.0f) / (1.0f + small);
-        default: return (v < 0.0f ? small : 1.0f) / (1.0f + small);
-    }
+    if (head == DIAPHANE_IMPORTANCE) return (v < 0.0f ? small : 1.0f) / (1.0f + small);
+    return (v > 0.0f ? v : 0.0f) + log1pf(small);
 }
 
 int diaphane_predict(const DiaphaneBundle *bundle, const float *x, float *y) {
     float buffer[2][DIAPHANE_MAX_UNITS];
     const float *weights = bundle->weights;
-    int layer, i;
+    int layer, i, fine = 1;
     for (i = 0; i < bundle->features; ++i) {
         float scaled = (x[i] - bundle->mean[i]) / bundle->std[i];
         if (!dia__finite(x[i])) return 0;
@@ -1013,10 +1016,11 @@ int diaphane_predict(const DiaphaneBundle *bundle, const float *x, float *y) {
         weights += (in + 1) * out;
     }
     for (i = 0; i < bundle->outputs; ++i) {
-        y[i] = dia__activate(bundle->output[i], buffer[bundle->layers % 2][i]);
-        if (!dia__finite(y[i])) return 0;
+        y[i] = buffer[bundle->layers % 2][i];
+        if (i == bundle->outputs - 1) y[i] = dia__activate(bundle->head, y[i]);
+        fine = fine && dia__finite(y[i]);
     }
-    return 1;
+    return fine;
 }
 
 int diaphane_self_test(const DiaphaneBundle *bundle, DiaphaneError *error) {
@@ -1046,7 +1050,7 @@ int diaphane_self_test(const DiaphaneBundle *bundle, DiaphaneError *error) {
     return 1;
 }
 
-/* ---- cuts ---- */
+/* ---- prices and cuts ---- */
 
 /* By its bits, as dia__finite. */
 static int dia__nan(float value) {
@@ -1055,16 +1059,44 @@ static int dia__nan(float value) {
     return (bits & 0x7FFFFFFFu) > 0x7F800000u;
 }
 
-static float dia__within(float x, float least, float most, float for_nan) {
-    return dia__nan(x) ? for_nan : x < least ? least : x > most ? most : x;
+/* What the tail tells of the log gain of a bin: n fragments, an optical depth `own` behind `before`; `whole` is the
+ * pixel's. A fragment alone in its bin is in the right place but for the steps in which shares are kept. */
+static float dia__prior(const DiaphaneBundle *bundle, float n, float own, float before, float whole) {
+    float covered = dia__larger(1.0f - expf(-own), dia__least_covered);
+    float gain = 2.0f * (logf(covered) - before) - logf(n);
+    float wrong = dia__larger(whole * (0.5f / (float)bundle->share_levels), dia__least_alone);
+    if (n < 1.5f) gain += 2.0f * logf(wrong < dia__most_alone ? wrong : dia__most_alone);
+    return dia__larger(gain, dia__least_prior);
 }
 
-void diaphane_importance_curve(float importance, float *a, float *b) {
-    const float least = 1.0f / dia__most_fall;
-    volatile float fall = 1.0f / (dia__nan(importance) ? least : dia__larger(importance, least));
-    volatile float gain = -1.5f * fall;
-    *a = dia__larger(gain, -dia__most_gain);
-    *b = fall;
+static uint32_t dia__rank(float price) {
+    const uint32_t last = (uint32_t)DIA__RANKS - 1u;
+    float steps = (price - dia__least_price) * dia__price_steps + 0.5f;
+    if (dia__nan(price) || steps >= (float)last) return last;
+    return steps > 0.0f ? (uint32_t)steps : 0u;
+}
+
+void diaphane_ranks(const DiaphaneBundle *bundle, const float *y, const float *sums, const uint8_t *counts,
+                    uint8_t *ranks) {
+    const float *front = sums + DIA__FRONT; /* of the second bin, and of those behind it */
+    const float whole = sums[DIA__OPTICAL_DEPTH];
+    const float weight = y && !dia__nan(y[0]) ? dia__larger(y[0], dia__least_importance) : dia__least_importance;
+    float fragments = 0.0f, before = 0.0f;
+    uint32_t rank = y ? 0u : (uint32_t)DIA__RANKS - 1u;
+    int bin;
+    for (bin = 0; bin < bundle->bins; ++bin) {
+        float n = (float)counts[bin], behind = bin + 1 < bundle->bins ? whole * front[bin] : whole, price;
+        if (bundle->head == DIAPHANE_IMPORTANCE) {
+            price = 2.0f * logf((fragments + 0.5f * n + 0.5f) / weight);
+        } else {
+            float prior = dia__prior(bundle, dia__larger(n, 1.0f), dia__larger(behind - before, 0.0f), before, whole);
+            price = y ? -(y[bin] + y[bundle->bins] * prior) : 0.0f;
+        }
+        if (counts[bin] && dia__rank(price) > rank) rank = dia__rank(price);
+        ranks[bin] = (uint8_t)rank;
+        fragments += n;
+        before = behind;
+    }
 }
 
 /* Fragments of a bin that can be in a core behind `before` others; DIAPHANE_FULL where it cannot, nor those behind it. */
@@ -1072,41 +1104,21 @@ static uint32_t dia__usable(uint8_t count, uint32_t before) {
     return before + count > (uint32_t)DIAPHANE_MOST_CORE ? (uint32_t)DIAPHANE_FULL : count;
 }
 
-/* Rank of the price from which a cut of `after` fragments is worth it. Each operation is rounded by itself, as in the
- * shaders: `volatile` keeps a compiler from fusing two of them. */
-static uint32_t dia__rank(float a, float b, uint32_t before, uint32_t after) {
-    const float gain = dia__within(a, -dia__most_gain, dia__most_gain, -dia__most_gain);
-    const float fall = dia__within(b, dia__least_fall, dia__most_fall, dia__most_fall);
-    volatile float middle = 0.5f * (float)(before + after);
-    volatile float steps = middle - 1.0f;
-    volatile float fallen = fall * steps;
-    volatile float price = fallen - gain;
-    volatile float above = price - dia__least_price;
-    float value = dia__larger(above, 1.0f), one = 1.0f;
-    uint32_t bits, bits_of_one;
-    memcpy(&bits, &value, sizeof bits);
-    memcpy(&bits_of_one, &one, sizeof bits_of_one);
-    bits = (bits - bits_of_one) >> DIA__DROPPED_BITS;
-    return bits < (uint32_t)DIA__RANKS ? bits : (uint32_t)DIA__RANKS - 1u;
-}
-
 typedef struct { uint32_t bins, fragments, more_bins, more_fragments; } dia__cut;
 
 /* What a pixel gets: what comes below a rank, and with what comes at it. */
-static dia__cut dia__cut_at(float a, float b, const uint8_t *counts, int bins, uint32_t rank) {
+static dia__cut dia__cut_at(const uint8_t *ranks, const uint8_t *counts, int bins, uint32_t rank) {
     dia__cut cut = {0, 0, 0, 0};
     uint32_t before = 0;
     int bin;
     for (bin = 0; bin < bins; ++bin) {
-        uint32_t own = dia__usable(counts[bin], before), found;
-        if (own == DIAPHANE_FULL) break;
+        uint32_t own = dia__usable(counts[bin], before);
+        if (own == DIAPHANE_FULL || (own && ranks[bin] > rank)) break;
         if (own == 0) continue;
-        found = dia__rank(a, b, before, before + own);
-        if (found > rank) break;
         before += own;
         cut.more_bins = (uint32_t)bin + 1;
         cut.more_fragments = before;
-        if (found < rank) {
+        if (ranks[bin] < rank) {
             cut.bins = cut.more_bins;
             cut.fragments = before;
         }
@@ -1128,7 +1140,7 @@ static dia__cut dia__whole_cut(const uint8_t *counts, int bins) {
 }
 
 /* The first rank up to which more comes than is left. *left becomes what is left before it. */
-static uint32_t dia__first_beyond(const float *a, const float *b, const uint8_t *counts, int bins, size_t pixels,
+static uint32_t dia__first_beyond(const uint8_t *ranks, const uint8_t *counts, int bins, size_t pixels,
                                   uint64_t *left) {
     uint64_t counted[DIA__RANKS] = {0};
     size_t p;
@@ -1141,7 +1153,7 @@ static uint32_t dia__first_beyond(const float *a, const float *b, const uint8_t 
             uint32_t own = dia__usable(own_counts[bin], before);
             if (own == DIAPHANE_FULL) break;
             if (own == 0) continue;
-            counted[dia__rank(a[p], b[p], before, before + own)] += own;
+            counted[ranks[p * (size_t)bins + (size_t)bin]] += own;
             before += own;
         }
     }
@@ -1163,8 +1175,8 @@ static dia__cut dia__cut_within(dia__cut found, const uint8_t *counts, uint64_t 
     return cut;
 }
 
-int diaphane_cuts(const float *a, const float *b, const uint8_t *counts, int bins, size_t pixels, uint64_t budget,
-                  uint32_t *cut, uint32_t *k, DiaphaneSolution *solution) {
+int diaphane_cuts(const uint8_t *ranks, const uint8_t *counts, int bins, size_t pixels, uint64_t budget, uint32_t *cut,
+                  uint32_t *k, DiaphaneSolution *solution) {
     DiaphaneSolution own = {1, 0, 0};
     uint64_t left = budget;
     uint32_t rank = 0;
@@ -1179,12 +1191,12 @@ int diaphane_cuts(const float *a, const float *b, const uint8_t *counts, int bin
     own.complete = own.total <= budget;
     if (!own.complete) {
         int grows = 1;
-        rank = dia__first_beyond(a, b, counts, bins, pixels, &left);
+        rank = dia__first_beyond(ranks, counts, bins, pixels, &left);
         own.rank = (int32_t)rank - 1;
         own.total = 0;
         for (p = 0; p < pixels; ++p) {
             dia__cut found = {0, 0, 0, 0};
-            if (k[p]) found = dia__cut_at(a[p], b[p], counts + p * (size_t)bins, bins, rank);
+            if (k[p]) found = dia__cut_at(ranks + p * (size_t)bins, counts + p * (size_t)bins, bins, rank);
             if (grows) {
                 dia__cut taken = dia__cut_within(found, counts + p * (size_t)bins, left);
                 grows = taken.fragments == found.more_fragments;

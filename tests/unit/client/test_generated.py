@@ -24,7 +24,7 @@ SOURCES = [
     for path in sorted((CLIENT / folder).rglob("*"))
     if path.suffix in {".c", ".h", ".py", ".ts", ".wgsl"}
 ]
-TELLING = ("MOST_CORE", "MOST_GAIN", "LEAST_FALL", "BIN_LIMIT", "LUMA_G")
+TELLING = ("MOST_CORE", "LEAST_IMPORTANCE", "BIN_LIMIT", "LUMA_G")
 """Constants whose numbers mean nothing else: of the others, that they are typed again is seen by the name alone."""
 
 

@@ -2,7 +2,8 @@
 
 Rules:
 - members that this client does not know are refused, as are those that it needs and that are not there;
-- the layers follow from the features, the hidden units and the outputs;
+- the outputs follow from the head and the bins of the tail, the layers from the features, the hidden units and the
+  outputs;
 - numbers are finite, spreads positive.
 """
 
@@ -27,11 +28,8 @@ MAX_FILES: Final = 16
 MAX_FEATURES: Final = 256
 MAX_HIDDEN: Final = 8
 
-HEADS: Final[Mapping[str, tuple[tuple[str, ...], ...]]] = {
-    "gain-curve": (("a", "b"), ("a", "b", "g")),
-    "importance": (("importance",),),
-}
-"""What a network of each head may answer."""
+HEADS: Final = ("bin-gains", "importance")
+"""What a network's answers can be."""
 
 _FORMAT: Final = "diaphane-bundle/2"
 _KEYS: Final = frozenset(
@@ -76,8 +74,8 @@ class Manifest:
     """What a bundle is.
 
     Attributes:
-        head: How the outputs are read: `gain-curve` or `importance`.
-        outputs: What the network answers, in this order; one of `HEADS[head]`.
+        head: How the outputs are read, one of `HEADS`.
+        outputs: What the network answers, in this order (`outputs_of`).
         features: Inputs, in order.
         hidden: Units of each hidden layer (ReLU).
         tail: Name of the tail that has to be rendered, one with depth bins.
@@ -97,6 +95,13 @@ class Manifest:
     def layers(self) -> dict[str, tuple[int, ...]]:
         """Tensor -> shape, in order; weights are [out, in]."""
         return _layers(len(self.features), self.hidden, len(self.outputs))
+
+
+def outputs_of(head: str, tail: str) -> tuple[str, ...]:
+    """What a network of a head answers for a tail, in order."""
+    if head == "importance":
+        return ("importance",)
+    return (*(f"gain_{b}" for b in range(BINS[tail])), "prior")
 
 
 def parse_manifest(content: bytes) -> Manifest:
@@ -139,8 +144,8 @@ def _parsed(fields: Any) -> Manifest:
         raise ValueError(f"{', '.join(sorted(missing))} is missing")
     if unknown := fields.keys() - _KEYS:
         raise ValueError(f"{', '.join(sorted(unknown))} is unknown")
-    head, outputs = fields["head"], tuple(fields["outputs"])
-    if outputs not in HEADS.get(head, ()):
+    head, outputs, tail = fields["head"], tuple(fields["outputs"]), _tail(fields["tail"])
+    if head not in HEADS or outputs != outputs_of(head, tail):
         raise ValueError(f"a network of the head {head!r} does not answer {', '.join(map(str, outputs))}")
     features = tuple(
         Feature(_text(each["name"]), _number(each["mean"]), _number(each["std"])) for each in _features(fields)
@@ -152,7 +157,7 @@ def _parsed(fields: Any) -> Manifest:
         outputs=outputs,
         features=features,
         hidden=_hidden(fields["hidden"]),
-        tail=_tail(fields["tail"]),
+        tail=tail,
         files=parse_files(fields["files"]),
         self_test=_self_test(fields["self_test"], len(features), len(outputs)),
     )

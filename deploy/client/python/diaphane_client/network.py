@@ -63,7 +63,10 @@ class Network:
             x = np.maximum(x @ weight.T + bias, np.float32(0.0))
         weight, bias = self.layers[-1]
         raw = x @ weight.T + bias
-        return np.stack([_ACTIVATIONS[name](raw[:, i]) for i, name in enumerate(self.outputs)], axis=1)
+        for i, name in enumerate(self.outputs):
+            if name in _ACTIVATIONS:
+                raw[:, i] = _ACTIVATIONS[name](raw[:, i])
+        return np.asarray(raw, dtype=np.float32)
 
 
 def read_network(content: bytes, manifest: Manifest) -> Network:
@@ -127,10 +130,5 @@ def _sigmoid(x: Array) -> Array:
     return np.asarray(np.where(x < 0.0, small, 1.0) / (1.0 + small), dtype=np.float32)
 
 
-_ACTIVATIONS: Final[Mapping[str, Callable[[Array], Array]]] = {
-    "a": lambda v: v,
-    "b": lambda v: _softplus(v) + np.float32(0.02),
-    "g": lambda v: np.float32(2.0) * _sigmoid(v),
-    "importance": _sigmoid,
-}
-"""Output -> function of the last layer's number; without overflow."""
+_ACTIVATIONS: Final[Mapping[str, Callable[[Array], Array]]] = {"prior": _softplus, "importance": _sigmoid}
+"""Output -> function of the last layer's number, without overflow; of the others it is the number itself."""

@@ -11,11 +11,12 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from diaphane_client.allocation import Cuts, allocate, importance_curve
-from diaphane_client.constants import BINS
+from diaphane_client.allocation import Cuts, allocate
+from diaphane_client.constants import BINS, SHARE_LEVELS
 from diaphane_client.errors import Refused
 from diaphane_client.manifest import MANIFEST, MAX_MANIFEST_BYTES, WEIGHTS, Manifest, parse_manifest
 from diaphane_client.network import Network, read_network
+from diaphane_client.prices import Bins, gain_ranks, importance_ranks
 
 SELF_TEST_TOLERANCE: Final = 1e-4
 """Largest difference of an answer to the manifest's rows, relative to its scale: another order of sums passes."""
@@ -81,13 +82,35 @@ class Predictor:
             raise ValueError("features must be finite")
         return self.network.answer(inputs)
 
-    def predict(self, features: NDArray[np.floating], F: int, counts: NDArray[np.integer]) -> Cuts:
+    def ranks(self, features: NDArray[np.floating], bins: Bins) -> NDArray[np.uint8]:
+        """Ranks of the prices from which bins are worth their fragments.
+
+        Args:
+            features: [P, C], columns `features`, not normalised; zeros where a pixel has no fragments.
+            bins: Of the same pixels, of the tail of the manifest.
+
+        Returns:
+            uint8 [P, bins], as the Python renderer has them, for `allocate`.
+
+        Raises:
+            ValueError: An argument is not as described.
+        """
+        tail = self.manifest.tail
+        bins.check(BINS[tail])
+        answers = self.answer(features)
+        if len(answers) != len(bins.counts):
+            raise ValueError("features and bins must be of the same pixels")
+        if self.manifest.head == "importance":
+            return importance_ranks(answers[:, 0], bins.counts)
+        return gain_ranks(answers, bins, SHARE_LEVELS[tail])
+
+    def predict(self, features: NDArray[np.floating], F: int, bins: Bins) -> Cuts:
         """The whole bins to keep exactly in each pixel, from the nearest; the tail holds the others.
 
         Args:
             features: [P, C], columns `features`, not normalised; zeros where a pixel has no fragments.
             F: Fragments to spend on all pixels together.
-            counts: int [P, bins], fragments in each of the tail's depth bins; 255 for that many or more.
+            bins: Of the same pixels, of the tail of the manifest.
 
         Returns:
             The cuts of the Python renderer, `sum k <= F`.
@@ -95,13 +118,7 @@ class Predictor:
         Raises:
             ValueError: An argument is not as described.
         """
-        bins = BINS[self.manifest.tail]
-        if np.ndim(counts) != 2 or np.shape(counts)[1] != bins:
-            raise ValueError(f"the tail {self.manifest.tail} has {bins} bins: give as many columns of counts")
-        answers = self.answer(features)
-        if self.manifest.head == "importance":
-            return allocate(*importance_curve(answers[:, 0]), counts, F)
-        return allocate(answers[:, 0], answers[:, 1], counts, F)
+        return allocate(self.ranks(features, bins), bins.counts, F)
 
     def _check(self) -> None:
         test = self.manifest.self_test

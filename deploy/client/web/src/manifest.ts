@@ -20,10 +20,7 @@ const MOST_BYTES = 64 * 2 ** 20;
 const MOST_MANIFEST_BYTES = 2 ** 20;
 const MOST_FILES = 16;
 const MOST_FEATURES = 256;
-const OUTPUTS: Readonly<Record<string, readonly string[]>> = {
-  "gain-curve": ["a,b", "a,b,g"],
-  importance: ["importance"],
-};
+const MOST_OUTPUTS = 64;
 
 export interface Manifest {
   readonly tail: Tail;
@@ -46,10 +43,10 @@ export function parseManifest(content: string): Manifest {
   const { name, g } = object(fields["tail"]);
   const tail = tailOf(String(name));
   const head = String(fields["head"]);
-  if (!Object.hasOwn(OUTPUTS, head) || !OUTPUTS[head]!.includes(String(fields["outputs"]))) {
+  if (!tail || number(g) < 0) throw new Error(`it has a tail without depth bins, or an unknown one, ${name}`);
+  if (String(fields["outputs"]) !== outputsOf(head, tail)) {
     throw new Error(`it has a head that is none, ${head} with ${fields["outputs"]}`);
   }
-  if (!tail || number(g) < 0) throw new Error(`it has a tail without depth bins, or an unknown one, ${name}`);
   const features = list(fields["features"], MOST_FEATURES);
   for (const feature of features.map(object)) {
     if (typeof feature["name"] !== "string" || !(number(feature["std"]) > 0))
@@ -59,6 +56,12 @@ export function parseManifest(content: string): Manifest {
   const files = parseFiles(fields["files"]);
   if (!(NETWORK in files)) throw new Error(`there is no ${NETWORK}`);
   return { tail, files, selfTest: selfTestOf(fields, features.length) };
+}
+
+/** What a network of a head answers for a tail, in order; null: there is no such head. */
+function outputsOf(head: string, { bins }: Tail): string | null {
+  if (head === "importance") return "importance";
+  return head === "bin-gains" ? [...Array.from({ length: bins }, (_, bin) => `gain_${bin}`), "prior"].join() : null;
 }
 
 /**
@@ -83,7 +86,7 @@ export function parseFiles(listed: unknown): Record<string, FileRef> {
 
 function selfTestOf(fields: Record<string, unknown>, inputs: number): SelfTest {
   const found = object(fields["self_test"]);
-  const outputs = list(fields["outputs"], 3).length;
+  const outputs = list(fields["outputs"], MOST_OUTPUTS).length;
   const rows = (value: unknown, wide: number): number[][] =>
     list(value, 1024).map((row) => {
       const numbers = list(row, 1024).map(number);

@@ -9,12 +9,16 @@ type Json = Record<string, unknown>;
 const bytes = (text: string): Uint8Array<ArrayBuffer> => new TextEncoder().encode(text) as Uint8Array<ArrayBuffer>;
 const base64 = (content: ArrayBuffer): string => Buffer.from(content).toString("base64");
 
+/** What a network answers for a tail of 16 bins. */
+const OUTPUTS = [...Array.from({ length: 16 }, (_, bin) => `gain_${bin}`), "prior"];
+const ANSWER = OUTPUTS.map(() => 1);
+
 export function manifestOf(files: Json): Json {
   return {
     format: "diaphane-bundle/2",
     name: "glass",
-    head: "gain-curve",
-    outputs: ["a", "b"],
+    head: "bin-gains",
+    outputs: OUTPUTS,
     features: [{ name: "log_n", mean: 1, std: 2 }],
     hidden: [],
     layers: [],
@@ -22,7 +26,7 @@ export function manifestOf(files: Json): Json {
     metric: "display",
     files,
     onnx: {},
-    self_test: { features: [[1]], outputs: [[2, 3]], output_scale: [1, 1], tolerance: { "predict.wgsl": 1e-4 } },
+    self_test: { features: [[1]], outputs: [ANSWER], output_scale: ANSWER, tolerance: { "predict.wgsl": 1e-4 } },
     parity: {},
     provenance: {},
     evaluation: {},

@@ -1,5 +1,5 @@
-// Where each pixel's run of slots begins: whole bins of predicted gain curves at the one price that uses a budget
-// (renderer/allocation/gpu.py), every fragment, or the same number everywhere.
+// Where each pixel's run of slots begins: whole bins at the one price that uses a budget (renderer/allocation/gpu.py),
+// every fragment, or the same number everywhere.
 
 import { CONSTANTS } from "../generated";
 import { BLOCK, CEILING, shader } from "../shaders";
@@ -85,7 +85,7 @@ export class Allocation {
     this.#run(work, ["cut_state", "begin_cuts"], "begin_cuts", [this.state, this.#budget], 1, tail);
   }
 
-  /** Selects the price that uses the budget, and lays out the pool. */
+  /** Selects the rank that uses the budget, and lays out the pool. */
   place(work: Work, { tail, words }: Binned): void {
     const counted = this.#frame.zeros(work, "prices", RANKS);
     const [state, cuts, sums] = [this.state, this.cuts, this.#sums];

@@ -9,17 +9,13 @@ import type { Allocation } from "./allocation";
 import type { Binned } from "./bins";
 import type { Frame } from "./frame";
 
-/** The network's text; one number is answered as a scalar, which a shader turns into the vector that it expects. */
-const textOf = ({ wgsl, selfTest }: Bundle): string =>
-  `${wgsl}\nalias Answer = vec${Math.max(selfTest.outputs[0]!.length, 2)}f;`;
+const FILES = ["cut_state", "bin_words", "cuts_of_counts", "bins", "kept_bins", "prices"];
 
-const FILES = ["cut_state", "bin_words", "cuts_of_counts", "bins", "kept_bins", "curves"];
-
-/** Predicts a and b of every occupied pixel, into its words. What was gathered has sums of luma. */
+/** Predicts the ranks of every occupied pixel's bins, into its words. What was gathered has sums of luma. */
 export function predict(frame: Frame, work: Work, bundle: Bundle, binned: Binned, into: Allocation): void {
   const read = [binned.words, into.state, frame.ranges, binned.luma!, frame.background.createView()];
-  const options = { tail: bundle.tail, before: textOf(bundle) };
-  frame.forPixels(work, FILES, "predict_curves", read, options);
+  const options = { tail: bundle.tail, before: bundle.wgsl };
+  frame.forPixels(work, FILES, "predict_ranks", read, options);
 }
 
 /**
@@ -31,7 +27,7 @@ export async function selfTest(gpu: Gpu, bundle: Bundle): Promise<void> {
   const { features, outputs, output_scale: scale, tolerance } = bundle.selfTest;
   const { STORAGE, COPY_SRC } = GPUBufferUsage;
   gpu.device.pushErrorScope("validation");
-  const pipeline = gpu.compute(shader(["self_test"], bundle.tail, textOf(bundle)), "answer_rows");
+  const pipeline = gpu.compute(shader(["self_test"], bundle.tail, bundle.wgsl), "answer_rows");
   const rows = gpu.filled(new Float32Array(features.flat()), STORAGE);
   const answers = gpu.filled(new Float32Array(outputs.flat().length), STORAGE | COPY_SRC);
   const encoder = gpu.device.createCommandEncoder();

@@ -5,7 +5,6 @@
 var<workgroup> own_counted: array<atomic<u32>, RANKS>;
 
 fn add_events(p: u32) {
-    let curve = curve_of(p);
     var before = 0u;
     for (var bin = 0u; bin < BINS; bin++) {
         let own = usable_in(p, bin, before);
@@ -15,7 +14,7 @@ fn add_events(p: u32) {
         if (own == 0u) {
             continue;
         }
-        atomicAdd(&own_counted[rank_of(curve, before, before + own)], own);
+        atomicAdd(&own_counted[rank_in(p, bin)], own);
         before += own;
     }
 }

@@ -1,5 +1,5 @@
-// A pixel's packed bins as a selection of cuts sees them (renderer/shaders/allocation/{bins,rank}.glsl). `words`, [P][BINS],
-// is declared before.
+// A pixel's packed bins as a selection of cuts sees them (renderer/shaders/allocation/bins.glsl). `words`, [P][BINS], is
+// declared before.
 fn count_of(p: u32, bin: u32) -> u32 {
     return (words[counts_at(p, bin / 4u)] >> (8u * (bin & 3u))) & FULL;
 }
@@ -19,14 +19,7 @@ fn usable_in(p: u32, bin: u32, before: u32) -> u32 {
     return select(own, FULL, before + own > MOST_CORE);
 }
 
-// Rank of the price from which a cut of `after` fragments is nearer to what a gain curve asks for than one of `before`.
-fn rank_of(curve: vec2f, before: u32, after: u32) -> u32 {
-    let price = curve.y * (0.5 * f32(before + after) - 1.0) - curve.x;
-    let above = max(price - LEAST_PRICE, 1.0);
-    return min((bitcast<u32>(above) - bitcast<u32>(1.0f)) >> DROPPED_BITS, RANKS - 1u);
-}
-
-// A predicted curve, log gain(k) = a - b (k - 1).
-fn curve_of(p: u32) -> vec2f {
-    return bitcast<vec2f>(vec2u(words[curve_at(p)], words[curve_at(p) + 1u]));
+// Of the price that a bin comes at (prices.wgsl).
+fn rank_in(p: u32, bin: u32) -> u32 {
+    return (words[ranks_at(p, bin / 4u)] >> (8u * (bin & 3u))) & (RANKS - 1u);
 }

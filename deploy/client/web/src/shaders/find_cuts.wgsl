@@ -1,5 +1,4 @@
-// What every pixel gets below the chosen rank, and with what comes at it. Kept as integers: later passes need not round
-// as this one does for the budget to hold.
+// What every pixel gets below the chosen rank, and with what comes at it.
 @group(0) @binding(0) var<storage, read> words: array<u32>;               // [P][BINS]
 @group(0) @binding(1) var<storage, read> state: Cuts;
 @group(0) @binding(2) var<storage, read_write> cuts: array<u32>;          // [P], 5, 10, 5 and 10 bits
@@ -9,7 +8,6 @@ var<workgroup> growth: atomic<u32>;
 
 // Bins and fragments that are granted, and the same with those that come at the rank itself.
 fn cut_of(p: u32) -> vec4u {
-    let curve = curve_of(p);
     var cut = vec4u(0u);
     var before = 0u;
     for (var bin = 0u; bin < BINS; bin++) {
@@ -22,7 +20,7 @@ fn cut_of(p: u32) -> vec4u {
         }
         var found = 0u;
         if (state.complete == 0u) {
-            found = rank_of(curve, before, before + own);
+            found = rank_in(p, bin);
             if (found > state.rank) {
                 break;
             }

@@ -12,8 +12,8 @@ fn answer_rows(@builtin(global_invocation_id) id: vec3u) {
     for (var i = 0u; i < DIAPHANE_FEATURES; i++) {
         x[i] = features[row * DIAPHANE_FEATURES + i];
     }
-    let y = Answer(diaphane_predict(x));
+    var answer = diaphane_predict(x);
     for (var i = 0u; i < DIAPHANE_OUTPUTS; i++) {
-        answers[row * DIAPHANE_OUTPUTS + i] = y[i];
+        answers[row * DIAPHANE_OUTPUTS + i] = answer.y[i];
     }
 }
