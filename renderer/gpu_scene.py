@@ -20,6 +20,8 @@ VERTEX = np.dtype([("position", "<f4", 3), ("normal", "<f4", 3), ("uv", "<f4", 2
 """Interleaved vertex, 36 bytes; the `in` variables of `common/surface.vert`."""
 
 _BINDINGS = "3f 3f 2f 4f1"
+_GLASS = ("reflectance", "presence", "has_presence_texture")
+"""Uniforms of `common/glass.glsl`."""
 _NAMES = ("in_position", "in_normal", "in_uv", "in_colour")
 
 # Texture units: 0..7 belong to the passes, these to the surface.
@@ -109,6 +111,9 @@ class GpuScene:
             set_uniforms(program, uniforms)
             if not batch.is_plain:
                 self._bind(program, batch)
+            if batch.reflectance is not None:
+                glass = (batch.reflectance, batch.presence, batch.has_presence_texture)
+                set_uniforms(program, dict(zip(_GLASS, glass, strict=True)))
             for first, triangles in runs:
                 if ranked:
                     set_uniforms(program, {"first_triangle": first})
@@ -162,6 +167,7 @@ def surface_defines(batch: Batch, textures: tuple[Texture, ...]) -> dict[str, in
         "WRAPPED": int(any(_WRAP_CODES[wrap] for wrap in wraps)),
         "MORE_UVS": int(max(batch.colour_uv, batch.opacity_uv, batch.emission_uv) > 0),
         "EMISSIVE": int(batch.emission_texture >= 0),
+        "GLASS": int(batch.reflectance is not None),
     }
 
 

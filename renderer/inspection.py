@@ -16,10 +16,11 @@ from renderer.scene_report import CameraFact, Kind, MaterialFact, PrimCount, Sce
 from renderer.timecodes import is_animated
 from renderer.usd.cameras import read_cameras
 from renderer.usd.digest import dependencies
+from renderer.usd.drivers import Driver
 from renderer.usd.instances import DRAWN_PURPOSES, Draw
 from renderer.usd.parts import Part
 from renderer.usd.stage import WarningLog, canonical_path, open_stage, stage_time, usd_diagnostics, usd_reason
-from renderer.usd.surfaces import Surface
+from renderer.usd.surfaces import Glass, Surface
 from schemas.problem import Problem
 from schemas.scene import SceneArrays
 
@@ -217,16 +218,38 @@ def _kind(part: Part) -> Kind:
 
 
 def _why(surface: Surface, alpha: float | None) -> str:
-    opacity = surface.opacity
-    if opacity.sampler is not None:
-        text = f"opacity from {opacity.sampler.file.name}, channel {'rgba'[opacity.number_channel]}"
-    elif opacity.primvar is not None:
-        text = f"opacity from primvar {opacity.primvar}"
-    else:
-        text = f"opacity {opacity.number_bias:g}"
+    if surface.glass is not None:
+        return _why_glass(surface, surface.glass)
+    text = f"opacity {_source(surface.opacity)}"
     if surface.threshold > 0.0:
         text += f", cut out below {surface.threshold:g}"
     return text if alpha is None else f"every surface has alpha {alpha:g}; as authored: {text}"
+
+
+def _why_glass(surface: Surface, glass: Glass) -> str:
+    facing, silhouette = glass.reflectance
+    text = f"glass: {glass.said}, drawn with Fresnel alpha {_short(facing)} to {_short(silhouette)}"
+    if not surface.colour.is_constant:
+        text += " and a tint that varies"
+    elif min(surface.colour.rgb) < 1.0:
+        text += f" and tint {' '.join(_short(x) for x in surface.colour.rgb)}"
+    if glass.has_presence:
+        text += f", opacity {_source(surface.opacity)}"
+    elif glass.presence < 1.0:
+        text += f", times opacity {glass.presence:g}"
+    return text + (f", cut out below {surface.threshold:g}" if surface.threshold > 0.0 else "")
+
+
+def _short(value: float) -> str:
+    """A number in [0,1] to two digits, without the zero before its point."""
+    text = f"{value:.2g}"
+    return text[1:] if text.startswith("0.") else text
+
+
+def _source(opacity: Driver) -> str:
+    if opacity.sampler is not None:
+        return f"from {opacity.sampler.file.name}, channel {'rgba'[opacity.number_channel]}"
+    return f"from primvar {opacity.primvar}" if opacity.primvar is not None else f"{opacity.number_bias:g}"
 
 
 def _add_finds(report: SceneReport, finds: _Finds) -> None:

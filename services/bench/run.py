@@ -20,6 +20,7 @@ from renderer.scene import LoadOptions
 from renderer.timing import timers_are_right
 from renderer.usd.digest import scene_digest
 from schemas.bench import BenchCell, BenchResult, BenchView, CellKey, Yardstick
+from schemas.glass import DEFAULT_GLASS
 from schemas.problem import ExitCode, Problem
 from schemas.scene import SceneArrays
 from schemas.view import View
@@ -117,7 +118,8 @@ def result_of(
 
 
 def _loaded(options: BenchOptions, alpha: float | None, file: Path, usd: Path) -> LocalScene:
-    local = LocalScene(file, usd, LoadOptions(alpha=alpha, variants=options.variants, refine=options.refine))
+    load = LoadOptions(alpha=alpha, glass=options.glass, variants=options.variants, refine=options.refine)
+    local = LocalScene(file, usd, load)
     local.at(None)
     return local
 
@@ -238,6 +240,7 @@ def _key(place: _Place, options: BenchOptions) -> str:
         "path": options.path,
         "driver": describe(gl_context()),
         "machine": machine(),
+        **({"glass": options.glass} if options.glass != DEFAULT_GLASS else {}),
     }
     return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
 
