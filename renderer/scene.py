@@ -17,6 +17,7 @@ from renderer.usd.cameras import read_cameras
 from renderer.usd.digest import scene_digest
 from renderer.usd.geometry import read_shape
 from renderer.usd.instances import Draw, Walker, product
+from renderer.usd.left_out import log_left_out
 from renderer.usd.materials import MaterialTable
 from renderer.usd.parts import Part, build_parts
 from renderer.usd.shape import Reading
@@ -103,6 +104,7 @@ def load_scene(path: Path, options: LoadOptions = LoadOptions(), watch: Watch | 
             # Whatever is looked up while it is read is looked up as the stage does it.
             with Ar.ResolverContextBinder(stage.GetPathResolverContext()):
                 scene = _StageReader(stage, path, options, log, watch).read()
+            log_left_out(stage.GetRootLayer(), log)
             used_layers(stage, options.home and options.home.resolve())
     except (Tf.ErrorException, UnicodeDecodeError) as error:
         # Also a damaged file's strings can have bytes that are no text.

@@ -60,9 +60,9 @@ class Batch:
         emission_scale: float RGBA factor on the sampled emission.
         emission_bias: float RGBA offset on the sampled emission.
         emission_uv: As `colour_uv`.
-        reflectance: Of glass (docs/METHOD.md, section 1), what it reflects facing the eye and at a silhouette, 0..1 each;
-            None: it is no glass. Of glass the colour is the tint of what goes through, and the vertex alpha, times the
-            opacity texture, the share of light that is not transmitted.
+        reflectance: Of glass (docs/METHOD.md, section 1), what it reflects facing the eye and at a silhouette, each in
+            [0,1]; None: it is no glass. Of glass the colour is the tint of what goes through, and the vertex alpha,
+            times the opacity texture, the share of light that is not transmitted.
         presence: Of glass, the opacity that multiplies all that; a threshold applies to it.
         has_presence_texture: Whether the opacity texture gives the presence instead.
     """

@@ -35,6 +35,7 @@ from services.budgets import holds_all, remedy, said_complete, said_defaults
 from services.local_scenes import LocalScene, as_usd
 from services.progress import Progress
 from services.rendering import bundle_folder
+from services.scene_warnings import said_warnings
 from services.store import canonical_json
 from services.versions import code_version, commit, library_versions, machine
 
@@ -74,9 +75,11 @@ def bench(options: BenchOptions, command: str, progress: Progress, told: Told = 
     left_out: list[str] = []
     with _bundle(options) as bundle:
         for file in options.scenes:
+            warned: set[str] = set()
             with as_usd(file) as usd:
                 for alpha in options.alphas:
                     local = _loaded(options, alpha, file, usd)
+                    _warn(file, local.now.scene.warnings, warned, progress)
                     if local.now.scene.is_opaque:
                         left_out.append(f"{file}, {said_alpha(alpha)}: nothing in it is transparent.")
                         progress.note(left_out[-1])
@@ -122,6 +125,13 @@ def _loaded(options: BenchOptions, alpha: float | None, file: Path, usd: Path) -
     local = LocalScene(file, usd, load)
     local.at(None)
     return local
+
+
+def _warn(file: Path, warnings: Sequence[str], warned: set[str], progress: Progress) -> None:
+    """Tells what was not told of the file at another opacity."""
+    for line in said_warnings(file, [text for text in warnings if text not in warned], file):
+        progress.note(line)
+    warned.update(warnings)
 
 
 def _places(options: BenchOptions, alpha: float | None, file: Path, usd: Path, local: LocalScene) -> list[_Place]:

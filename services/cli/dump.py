@@ -54,6 +54,7 @@ def dump(
     from services.dumping import dump as run
     from services.options import parse_glass, parse_size
     from services.render_options import parse_background, parse_refine
+    from services.scene_warnings import said_warnings
 
     load = LoadOptions(
         alpha=alpha,
@@ -74,8 +75,8 @@ def dump(
             background=parse_background(background),
         )
     )
-    for warning in dumped.warnings if not as_json else ():
-        output.err().print(f"warning: {warning}", markup=False)
+    for line in said_warnings(file, dumped.warnings, file) if not as_json else ():
+        output.err().print(line, markup=False)
     if as_json:
         files = [{**asdict(each), "path": str(each.path)} for each in dumped.written]
         output.print_json({**asdict(dumped), "written": files})

@@ -1,5 +1,5 @@
-// A thin dielectric (docs/METHOD.md, section 1; schemas/scene.py: Batch): it reflects the more the flatter it is seen, and
-// tints what goes through. Every step that alpha depends on is `precise`, so that all passes store the same one.
+// A thin dielectric (docs/METHOD.md, section 1; schemas/scene.py: Batch): a white layer that reflects the more the flatter
+// it is seen, over a layer of the tint that covers what is not let through. Every step that alpha depends on is `precise`, so that all passes store the same one.
 // Twin in float64: renderer/reference/glass.py.
 uniform vec2 reflectance;  // facing the eye, at a silhouette
 uniform float presence;
@@ -33,9 +33,8 @@ uvec4 stored_surface() {
     precise float through = (tint.r + tint.g + tint.b) / 3.0;
     precise float mirrored = reflected();
     precise float covered = 1.0 - (1.0 - mirrored) * (1.0 - body) * through;
-    vec3 kept = body * tint + (1.0 - body) * max(tint - through, 0.0);
-    vec3 albedo = (mirrored + (1.0 - mirrored) * kept) / max(covered, 1e-6);
-    vec3 encoded = sqrt(clamp(shade(clamp(albedo, 0.0, 1.0)), 0.0, 1.0));
+    vec3 albedo = mix(tint, vec3(1.0), min(mirrored / max(covered, 1e-6), 1.0));
+    vec3 encoded = sqrt(clamp(shade(albedo), 0.0, 1.0));
     precise float level = there * covered * 255.0 + 0.5;
     uint alpha = clamp(uint(level), 1u, 254u);
     if (there * 255.0 < 0.5) alpha = 0u;
