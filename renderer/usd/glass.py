@@ -40,7 +40,7 @@ def preview_glass(network: Network, shader: UsdShade.Shader) -> Surface | None:
     else:
         ior = network.number(shader, "ior", IOR)
         facing, said = at_normal(ior), f"opacity 0, ior {ior:g}"
-    _without_emission(network, shader, "emissiveColor", None)
+    _without_emission(network, shader, "emissiveColor", 1.0)
     # Nothing tints what goes through: the diffuse colour is multiplied by the opacity.
     return _pane(Driver(bias=ONES), Driver(bias=ONES), Driver(bias=ONES), 0.0, Glass((facing, 1.0), said))
 
@@ -85,7 +85,8 @@ def materialx_glass(network: Network, shader: UsdShade.Shader) -> Surface | None
     glass = Glass(_reflectance(network, shader, kind, ior), f"transmission {amount}, ior {ior:g}")
     made = _pane(tint, transmission, presence, threshold, glass)
     if made is not None:
-        _without_emission(network, shader, names.emission, names.glow)
+        factor = network.number(shader, names.glow, names.dark) if names.glow else 1.0
+        _without_emission(network, shader, names.emission or "emission_luminance", factor)
     return made
 
 
@@ -149,9 +150,9 @@ def _pane(tint: Driver, transmission: Driver, presence: Driver, threshold: float
     return Surface(tint, opacity=presence, threshold=threshold, glass=kept)
 
 
-def _without_emission(network: Network, shader: UsdShade.Shader, name: str, factor: str | None) -> None:
+def _without_emission(network: Network, shader: UsdShade.Shader, name: str, factor: float) -> None:
     """Says that glass which emits light is drawn without it."""
-    if not name or (factor and network.number(shader, factor, 0.0) <= 0.0):
+    if factor <= 0.0:
         return
     emission = network.drive(shader.GetInput(name), ZEROS)
     if not emission.is_constant or max(emission.rgb) > 0.0:
