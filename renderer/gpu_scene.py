@@ -20,8 +20,6 @@ VERTEX = np.dtype([("position", "<f4", 3), ("normal", "<f4", 3), ("uv", "<f4", 2
 """Interleaved vertex, 36 bytes; the `in` variables of `common/surface.vert`."""
 
 _BINDINGS = "3f 3f 2f 4f1"
-_GLASS = ("reflectance", "presence", "has_presence_texture")
-"""Uniforms of `common/glass.glsl`."""
 _NAMES = ("in_position", "in_normal", "in_uv", "in_colour")
 
 # Texture units: 0..7 belong to the passes, these to the surface.
@@ -112,8 +110,7 @@ class GpuScene:
             if not batch.is_plain:
                 self._bind(program, batch)
             if batch.reflectance is not None:
-                glass = (batch.reflectance, batch.presence, batch.has_presence_texture)
-                set_uniforms(program, dict(zip(_GLASS, glass, strict=True)))
+                set_uniforms(program, _glass(batch))
             for first, triangles in runs:
                 if ranked:
                     set_uniforms(program, {"first_triangle": first})
@@ -156,6 +153,16 @@ class GpuScene:
                 self._textures[index].use(_UNITS[role])
                 uniforms[f"{role}_wrap"] = tuple(_WRAP_CODES[wrap] for wrap in self.scene.textures[index].wrap)
         set_uniforms(program, uniforms)
+
+
+def _glass(batch: Batch) -> dict[str, object]:
+    """Uniforms of `common/glass.glsl`."""
+    return {
+        "reflectance": batch.reflectance,
+        "transmittance": -1.0 if batch.transmittance is None else batch.transmittance,
+        "presence": batch.presence,
+        "has_presence_texture": batch.has_presence_texture,
+    }
 
 
 def surface_defines(batch: Batch, textures: tuple[Texture, ...]) -> dict[str, int]:

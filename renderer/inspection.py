@@ -231,7 +231,7 @@ def _why_glass(surface: Surface, glass: Glass) -> str:
     text = f"glass: {glass.said}, drawn with Fresnel alpha {_short(facing)} to {_short(silhouette)}"
     if not surface.colour.is_constant:
         text += " and a tint that varies"
-    elif min(surface.colour.rgb) < 1.0:
+    elif glass.transmittance is None and min(surface.colour.rgb) < 1.0:
         text += f" and tint {' '.join(_short(x) for x in surface.colour.rgb)}"
     if glass.has_presence:
         text += f", opacity {_source(surface.opacity)}"

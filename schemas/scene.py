@@ -63,6 +63,7 @@ class Batch:
         reflectance: Of glass (docs/METHOD.md, section 1), what it reflects facing the eye and at a silhouette, each in
             [0,1]; None: it is no glass. Of glass the colour is the tint of what goes through, and the vertex alpha,
             times the opacity texture, the share of light that is not transmitted.
+        transmittance: Of glass whose colour is not its tint, the mean of the tint; None: it is that of the colour.
         presence: Of glass, the opacity that multiplies all that; a threshold applies to it.
         has_presence_texture: Whether the opacity texture gives the presence instead.
     """
@@ -86,6 +87,7 @@ class Batch:
     emission_bias: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     emission_uv: int = 0
     reflectance: tuple[float, float] | None = None
+    transmittance: float | None = None
     presence: float = 1.0
     has_presence_texture: bool = False
 

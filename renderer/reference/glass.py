@@ -20,21 +20,21 @@ def reflected(reflectance: tuple[float, float], cosine: Floats) -> Floats:
 
 
 def levels(
-    reflectance: tuple[float, float], cosine: Floats, tint: Floats, body: Floats, presence: Floats
+    reflectance: tuple[float, float], cosine: Floats, transmittance: Floats, body: Floats, presence: Floats
 ) -> tuple[Floats, NDArray[np.uint8]]:
     """Stored alpha of fragments.
 
     Args:
         reflectance: As above.
         cosine: As above.
-        tint: float64 [N, 3], linear RGB.
+        transmittance: float64 [N], mean of the tint.
         body: float64 [N], share of light that is not transmitted.
         presence: float64 [N], opacity of all of it.
 
     Returns:
         Times 255 before it is rounded, and as it is stored.
     """
-    through = (1.0 - reflected(reflectance, cosine)) * (1.0 - body) * tint.mean(axis=1)
+    through = (1.0 - reflected(reflectance, cosine)) * (1.0 - body) * transmittance
     level = 255.0 * presence * (1.0 - through)
     stored = np.clip(np.floor(level + 0.5), 1.0, 254.0)
     stored[255.0 * presence * body >= 254.5] = 255.0

@@ -1,13 +1,13 @@
 """Surface shaders that transmit light, as thin dielectrics: what they reflect, and the tint of what goes through.
 
-A surface has one colour for its tint and, where it transmits a part of the light only, for the rest. Refraction,
+A surface has one colour: its tint, or where it transmits the smaller part of the light that of the rest. Refraction,
 roughness and dispersion are left out. docs/METHOD.md, section 1, has what is drawn of it, with sources.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pxr import UsdShade
 
@@ -79,10 +79,10 @@ def materialx_glass(network: Network, shader: UsdShade.Shader) -> Surface | None
         mode = number_of(network.value(shader.GetInput("alpha_mode")), 0.0)
         presence = presence if mode in (1.0, 2.0) else Driver(bias=ONES)
         threshold = network.number(shader, "alpha_cutoff", 0.5) if mode == 1.0 else 0.0
-    tint = _tint(network, shader, kind, transmission)
+    tint, through = _tint(network, shader, kind, transmission)
     ior = network.number(shader, _MATERIALX[kind].ior, IOR)
     amount = f"{transmission.number_bias:g}" if transmission.is_constant else f"from {_source(transmission)}"
-    glass = Glass(_reflectance(network, shader, kind, ior), f"transmission {amount}, ior {ior:g}")
+    glass = Glass(_reflectance(network, shader, kind, ior), f"transmission {amount}, ior {ior:g}", through)
     made = _pane(tint, transmission, presence, threshold, glass)
     if made is not None:
         factor = network.number(shader, names.glow, names.dark) if names.glow else 1.0
@@ -109,14 +109,15 @@ def _reflectance(network: Network, shader: UsdShade.Shader, kind: str, ior: floa
     return weight * _clamped(colour) * at_normal(ior), weight * _clamped(colour)
 
 
-def _tint(network: Network, shader: UsdShade.Shader, kind: str, transmission: Driver) -> Driver:
-    """What light becomes on its way through one surface."""
+def _tint(network: Network, shader: UsdShade.Shader, kind: str, transmission: Driver) -> tuple[Driver, float | None]:
+    """The colour of the surface, and where that is not what light becomes on its way through it, the mean of that."""
     if kind == "gltf_pbr":
         # glTF's base colour tints what is transmitted as well (KHR_materials_transmission).
-        return base_colour(network, shader, kind).times(_attenuation(network, shader))
+        return base_colour(network, shader, kind).times(_attenuation(network, shader)), None
     if transmission.is_constant and transmission.number_bias > 0.5:
-        return network.drive(shader.GetInput(MATERIALX[kind].tint), ONES)
-    return base_colour(network, shader, kind)
+        return network.drive(shader.GetInput(MATERIALX[kind].tint), ONES), None
+    through = _mean(network, shader, MATERIALX[kind].tint, ONES)
+    return base_colour(network, shader, kind), _clamped(through)
 
 
 def _attenuation(network: Network, shader: UsdShade.Shader) -> tuple[float, float, float, float]:
@@ -142,11 +143,11 @@ def _pane(tint: Driver, transmission: Driver, presence: Driver, threshold: float
         there = _clamped(presence.number_bias)
         if threshold > 0.0:
             there = float(there >= threshold)
-        kept = Glass(glass.reflectance, glass.said, presence=there)
+        kept = replace(glass, presence=there)
         return Surface(tint, opacity=body, glass=kept) if there > 0.0 else None
     if presence.sampler is None or not transmission.is_constant:
         return None
-    kept = Glass(glass.reflectance, glass.said, body=_clamped(body.number_bias), has_presence=True)
+    kept = replace(glass, body=_clamped(body.number_bias), has_presence=True)
     return Surface(tint, opacity=presence, threshold=threshold, glass=kept)
 
 

@@ -171,6 +171,7 @@ class _PartBuilder:
             style = replace(
                 style,
                 reflectance=of.glass.reflectance,
+                transmittance=of.glass.transmittance,
                 presence=of.glass.presence,
                 has_presence_texture=of.glass.has_presence,
             )

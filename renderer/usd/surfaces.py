@@ -28,6 +28,7 @@ class Glass:
     Attributes:
         reflectance: Fraction of light that is reflected facing the eye, and at a silhouette.
         said: What the material says, for reports.
+        transmittance: Mean of the tint, where that is not the surface's colour; None: it is.
         body: Share of light that is not transmitted, where it is the same everywhere.
         presence: Opacity of all of it, where that is the same everywhere.
         has_presence: Whether `opacity` is the presence; else it is the body.
@@ -35,6 +36,7 @@ class Glass:
 
     reflectance: tuple[float, float]
     said: str
+    transmittance: float | None = None
     body: float = 0.0
     presence: float = 1.0
     has_presence: bool = False
@@ -45,7 +47,7 @@ class Surface:
     """What a material says about colour and opacity.
 
     Attributes:
-        colour: Linear RGB; of glass, the tint of what goes through.
+        colour: Linear RGB; of glass, most often the tint of what goes through.
         emission: Linear RGB that is added.
         opacity: In [0,1].
         threshold: `opacityThreshold`; above 0 the surface is a cut-out.

@@ -66,7 +66,7 @@ def test_a_pane_has_the_alpha_of_its_angle(gl: moderngl.Context, degrees: float,
     _, rays = Camera.of(view, scene.bounds, 32, 24).view_rays(np.flatnonzero(seen))
     cosine = np.abs(rays @ normal) / np.linalg.norm(rays, axis=1)
     tint = np.tile(decode_gamma2(np.array(rgba[:3], np.uint8)), (len(rays), 1))
-    level, _ = levels(reflectance, cosine, tint, np.zeros(len(rays)), np.full(len(rays), presence))
+    level, _ = levels(reflectance, cosine, tint.mean(axis=1), np.zeros(len(rays)), np.full(len(rays), presence))
     assert np.abs(dump.rgba[:, 3] - level).max() <= ROUNDING
 
 
@@ -97,7 +97,7 @@ def test_every_fragment_of_a_sphere_has_the_alpha_of_its_interpolated_normal(gl:
     lengths = np.linalg.norm(normals, axis=1) * np.linalg.norm(rays, axis=1)
     cosine = np.abs((normals * rays).sum(axis=1)) / lengths
     tint = np.tile(decode_gamma2(np.array(rgba[:3], np.uint8)), (len(rows), 1))
-    level, stored = levels(reflectance, cosine, tint, np.full(len(rows), body / 255.0), np.ones(len(rows)))
+    level, stored = levels(reflectance, cosine, tint.mean(axis=1), np.full(len(rows), body / 255.0), np.ones(len(rows)))
     alpha = dump.rgba[np.flatnonzero(np.isin(np.repeat(np.arange(dump.pixels), dump.counts), pixels[sure])), 3]
     assert len(alpha) == len(rows) > 500
     assert np.ptp(alpha) > 80, "the sphere is seen from every angle"

@@ -1,7 +1,9 @@
 // A thin dielectric (docs/METHOD.md, section 1; schemas/scene.py: Batch): a white layer that reflects the more the flatter
-// it is seen, over a layer of the tint that covers what is not let through. Every step that alpha depends on is `precise`, so that all passes store the same one.
+// it is seen, over a layer of the tint that covers what is not let through. Every step that alpha depends on is
+// `precise`, so that all passes store the same one.
 // Twin in float64: renderer/reference/glass.py.
 uniform vec2 reflectance;  // facing the eye, at a silhouette
+uniform float transmittance;  // below 0: the mean of the tint
 uniform float presence;
 uniform bool has_presence_texture;
 
@@ -30,7 +32,7 @@ uvec4 stored_surface() {
         else there *= opacity;
     }
 #endif
-    precise float through = (tint.r + tint.g + tint.b) / 3.0;
+    precise float through = transmittance < 0.0 ? (tint.r + tint.g + tint.b) / 3.0 : transmittance;
     precise float mirrored = reflected();
     precise float covered = 1.0 - (1.0 - mirrored) * (1.0 - body) * through;
     vec3 albedo = mix(tint, vec3(1.0), min(mirrored / max(covered, 1e-6), 1.0));

@@ -153,6 +153,15 @@ def test_transmission_of_materialx(
     assert scene.warnings == ()
 
 
+def test_what_transmits_the_smaller_part_has_its_base_colour_and_its_tints_transmittance(
+    tmp_path: Path,
+) -> None:
+    inputs = {"transmission": 0.25, "base": 0.0, "transmission_color": (1.0, 0.5, 0.0)}
+    scene = materialx(tmp_path, "standard_surface", **inputs).load()
+    assert only(scene).transmittance == pytest.approx(0.5)
+    assert scene.colours[0].tolist() == [0, 0, 0, 191]
+
+
 def test_glass_with_an_opacity_keeps_both(tmp_path: Path) -> None:
     scene = materialx(tmp_path, "standard_surface", transmission=1.0, opacity=(0.5, 0.5, 0.5)).load()
     assert (only(scene).presence, only(scene).layer, scene.colours[0, 3]) == (0.5, "transparent", 0)
