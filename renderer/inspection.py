@@ -227,8 +227,8 @@ def _why(surface: Surface, alpha: float | None) -> str:
 
 
 def _why_glass(surface: Surface, glass: Glass) -> str:
-    facing, silhouette = glass.reflectance
-    text = f"glass: {glass.said}, drawn with Fresnel alpha {_short(facing)} to {_short(silhouette)}"
+    low, high = (_short(1.0 - (1.0 - mirrored) * _let_through(surface, glass)) for mirrored in glass.reflectance)
+    text = f"glass: {glass.said}, drawn with Fresnel alpha {low} to {high}"
     if not surface.colour.is_constant:
         text += " and a tint that varies"
     elif glass.transmittance is None and min(surface.colour.rgb) < 1.0:
@@ -238,6 +238,16 @@ def _why_glass(surface: Surface, glass: Glass) -> str:
     elif glass.presence < 1.0:
         text += f", times opacity {glass.presence:g}"
     return text + (f", cut out below {surface.threshold:g}" if surface.threshold > 0.0 else "")
+
+
+def _let_through(surface: Surface, glass: Glass) -> float:
+    """Fraction of the light that is not reflected and goes through; at most, where it varies."""
+    tint = glass.transmittance
+    if tint is None:
+        tint = sum(surface.colour.rgb) / 3.0 if surface.colour.is_constant else 1.0
+    if glass.has_presence:
+        return tint * (1.0 - glass.body)
+    return tint * (1.0 - surface.opacity.number_bias if surface.opacity.is_constant else 1.0)
 
 
 def _short(value: float) -> str:

@@ -299,8 +299,8 @@ def test_glass_is_drawn_and_what_a_picture_lacks_is_said(folder: Path, capsys: p
     for command in (["render", "panes.usda", "-w", "40"], bench, ["dump", "panes.usda", "-o", "d", "-w", "40"]):
         assert run(command) == ExitCode.OK
         assert capsys.readouterr().err.count(told) == 1
-        assert run([*command, "--glass", "plain"]) == ExitCode.OK
-        assert lost in capsys.readouterr().err
+    assert run(["render", "panes.usda", "-w", "40", "--glass", "plain"]) == ExitCode.OK
+    assert lost in capsys.readouterr().err
     assert run(["scene", "inspect", "panes.usda"]) == ExitCode.OK
     assert "glass: opacity 0, ior 1.5, drawn with Fresnel alpha .04 to 1" in capsys.readouterr().out
     assert run(["render", "panes.usda", "--glass", "thick"]) == ExitCode.USAGE

@@ -160,6 +160,8 @@ def test_what_transmits_the_smaller_part_has_its_base_colour_and_its_tints_trans
     scene = materialx(tmp_path, "standard_surface", **inputs).load()
     assert only(scene).transmittance == pytest.approx(0.5)
     assert scene.colours[0].tolist() == [0, 0, 0, 191]
+    # 1 - 0.96 * 0.25 * 0.5
+    assert why(tmp_path) == "glass: transmission 0.25, ior 1.5, drawn with Fresnel alpha .88 to 1"
 
 
 def test_glass_with_an_opacity_keeps_both(tmp_path: Path) -> None:
