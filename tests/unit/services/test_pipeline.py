@@ -359,3 +359,15 @@ def test_what_does_not_change_a_picture_does_not_change_its_address() -> None:
     for stage in ("scene", "render"):
         assert [task.artifact for task in one.of(stage)] == [task.artifact for task in other.of(stage)]
     assert one.of("label")[0].artifact != other.of("label")[0].artifact
+
+
+def test_the_reading_of_glass_reaches_every_task_that_loads_a_scene_and_the_bundle() -> None:
+    usual, plain = TableRunner(), TableRunner()
+    run(usual, spec())
+    run(plain, spec(glass="plain"))
+    for runner, wanted in ((usual, "fresnel"), (plain, "plain")):
+        read = [task for stage in ("scene", "render", "evaluate") for task in runner.of(stage)]
+        assert {task.params["glass"] for task in read} == {wanted}
+    (exported,) = plain.of("export")
+    assert exported.params["settings"]["glass"] == "plain"
+    assert "glass" not in usual.of("export")[0].params["settings"]
