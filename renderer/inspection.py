@@ -212,7 +212,7 @@ class _Census:
 
 
 def _kind(part: Part) -> Kind:
-    if part.style.opacity_threshold > 0.0 and part.style.cut_out_alpha >= 1.0:
+    if part.style.opacity_threshold > 0.0 and part.style.cut_out_alpha >= 1.0 and part.surface.glass is None:
         return "cut-out"
     return "opaque" if part.style.layer == "opaque" else "transparent"
 

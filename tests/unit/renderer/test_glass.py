@@ -187,7 +187,9 @@ def test_textures_of_transmission_and_of_presence_differ(tmp_path: Path) -> None
     batch = only(scene)
     assert (batch.has_presence_texture, batch.opacity_threshold, batch.layer) == (True, 0.25, "mixed")
     assert scene.colours[0, 3] == 102, "what is not transmitted"
-    assert "opacity from a.png, channel r, cut out below 0.25" in why(tmp_path)
+    fact = inspect_scene(tmp_path / "card.usda").materials["/Looks/M"]
+    assert fact.kind == "transparent"
+    assert "opacity from a.png, channel r, cut out below 0.25" in fact.why
 
 
 def test_glass_that_glows_is_drawn_without_and_that_is_said(tmp_path: Path) -> None:
