@@ -10,8 +10,6 @@ PixelWeights = Literal["none", "flip"]
 PIXEL_WEIGHTS: tuple[PixelWeights, ...] = get_args(PixelWeights)
 DEFAULT_WEIGHTS: PixelWeights = "none"
 
-WEIGHTS_HELP = "What a pixel's errors count in training: none (all alike) or flip."
-
 
 def without_default(described: dict[str, Any]) -> dict[str, Any]:
     """What is written of something with `weights`: they are named only where there are any."""

@@ -40,7 +40,13 @@ class Own:
     @classmethod
     def of_plan(cls, plan: Plan) -> Own:
         """The scenes of a plan."""
-        labels = {"tail": plan.tail, "g": plan.g, "metric": METRIC, "seed": plan.seed, "weights": plan.weights}
+        labels = {
+            "tail": plan.options.tail,
+            "g": plan.options.g,
+            "metric": METRIC,
+            "seed": plan.options.seed,
+            "weights": plan.options.weights,
+        }
         return cls(scenes_of(plan), labels)
 
     @classmethod

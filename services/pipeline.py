@@ -86,10 +86,10 @@ def report_data(built: Built, command: str, created: str, skipped: Mapping[str, 
         "registry": built.registered.model_dump(mode="json"),
         "skipped": dict(skipped),
         "provenance": {
-            "seed": built.plan.seed,
-            "tail": built.plan.tail,
-            "g": built.plan.g,
-            "alpha": built.plan.alpha,
+            "seed": built.plan.options.seed,
+            "tail": built.plan.options.tail,
+            "g": built.plan.options.g,
+            "alpha": built.plan.options.alpha,
             "bundle": built.bundle.digest,
             "scenes": {scene.label: scene.digest for scene in built.scenes},
         },
@@ -288,8 +288,8 @@ def _publish(
     evaluation = {
         "views": sorted(view.labelled.rendered.task.address.key for view in held_out),
         "budgets": list(plan.budgets),
-        "tail": plan.tail,
-        "g": plan.g,
+        "tail": plan.options.tail,
+        "g": plan.options.g,
     }
 
     def body() -> dict[str, Any]:

@@ -49,7 +49,7 @@ def dump(
     from renderer.scene import LoadOptions
     from services.dumping import DumpOptions
     from services.dumping import dump as run
-    from services.options import parse_size
+    from services.flags import parse_size
     from services.render_options import parse_background, parse_refine
 
     load = LoadOptions(alpha=alpha, variants=tuple(variant or ()), refine=parse_refine(complexity, refine))

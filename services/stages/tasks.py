@@ -56,10 +56,10 @@ def scene_task(plan: Plan, scene: PlannedScene) -> Task:
         version=version_of("scene"),
         inputs=(scene.source.digest,),
         params={
-            "alpha": plan.alpha,
+            "alpha": plan.options.alpha,
             "views": [view.model_dump(mode="json") for view in scene.listed],
-            "count": plan.views_per_scene,
-            "seed": plan.seed,
+            "count": plan.options.views_per_scene,
+            "seed": plan.options.seed,
         },
         scene=scene.source,
     )
@@ -84,7 +84,7 @@ def label_task(plan: Plan, view: RenderedView) -> Task:
         stage="label",
         version=version_of("label"),
         inputs=(view.task.address.key,),
-        params={**_allocation(plan), "metric": METRIC, "seed": plan.seed, **_weights(plan)},
+        params={**_allocation(plan), "metric": METRIC, "seed": plan.options.seed, **_weights(plan)},
         needs=(view.task.artifact,),
     )
 
@@ -101,11 +101,16 @@ def train_task(
         start: Bundle whose weights the training begins with.
         config: Further settings of the trainer.
     """
-    params: dict[str, Any] = {"seed": plan.seed, "steps": plan.steps, "network": plan.network, **(config or {})}
+    params: dict[str, Any] = {
+        "seed": plan.options.seed,
+        "steps": plan.options.steps,
+        "network": plan.options.network,
+        **(config or {}),
+    }
     inputs = [f"{digest}:{artifact.partition('/')[2]}" for digest, artifact in shards]
     inputs += [f"{digest}:{artifact.partition('/')[2]}{REPLAYED}" for digest, artifact in plan.replayed]
-    if plan.patience:
-        params["patience"] = plan.patience
+    if plan.options.patience:
+        params["patience"] = plan.options.patience
     if start is not None:
         params["start"] = start.digest
     if plan.replay is not None:
@@ -218,12 +223,16 @@ def _network(bundle: Source) -> str:
 
 
 def _picture(plan: Plan, view: View) -> dict[str, Any]:
-    return {"view": view.model_dump(mode="json"), "size": [plan.width, plan.height], "alpha": plan.alpha}
+    return {
+        "view": view.model_dump(mode="json"),
+        "size": [plan.options.width, plan.options.height],
+        "alpha": plan.options.alpha,
+    }
 
 
 def _weights(plan: Plan) -> dict[str, Any]:
-    return {"weights": plan.weights} if plan.weights != DEFAULT_WEIGHTS else {}
+    return {"weights": plan.options.weights} if plan.options.weights != DEFAULT_WEIGHTS else {}
 
 
 def _allocation(plan: Plan) -> dict[str, Any]:
-    return {"budgets": list(plan.budgets), "tail": plan.tail, "g": plan.g}
+    return {"budgets": list(plan.budgets), "tail": plan.options.tail, "g": plan.options.g}

@@ -57,7 +57,13 @@ class Home:
         self.publish(train_task(plan, list(zip((OLD.digest, BOTH.digest), self.labels, strict=True)), None), "a")
 
     def label(self, name: str, plan: Plan) -> str:
-        params = {"budgets": [256], "tail": plan.tail, "g": plan.g, "metric": METRIC, "seed": plan.seed}
+        params = {
+            "budgets": [256],
+            "tail": plan.options.tail,
+            "g": plan.options.g,
+            "metric": METRIC,
+            "seed": plan.options.seed,
+        }
         return self.put(Address("label", "v", (name,), params))
 
     def put(self, address: Address) -> str:
@@ -189,7 +195,7 @@ def test_a_job_of_before_has_the_addresses_of_before(home: Home) -> None:
     old = spec(start="champion", name="glass").model_dump(mode="json", exclude={"replay", "patience", "weights"})
     stored = JobSpec.model_validate(old)
     plan = home.plan(stored)
-    assert (plan.start, plan.replayed, plan.patience, plan.from_champion) == (None, (), 0, True)
+    assert (plan.start, plan.replayed, plan.options.patience, plan.from_champion) == (None, (), 0, True)
     train = train_task(plan, [(NEW.digest, home.labels[0])], None)
     assert train.inputs == (f"{NEW.digest}:{home.labels[0].partition('/')[2]}",)
     assert set(train.params) == {"seed", "steps", "network"}

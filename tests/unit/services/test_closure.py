@@ -56,6 +56,7 @@ def versions(root: Path) -> dict[str, str]:
         ("services/__init__.py", EVERY),
         ("schemas/scene.py", EVERY),
         ("renderer/gate/gltf.py", EVERY),  # of a .glb, by an import in a function
+        ("schemas/options.py", {"export"}),  # a new option makes anew only what it decides
         ("renderer/rooms.py", {"scene"}),
         ("renderer/capture.py", {"render"}),
         ("renderer/shaders/capture/append.frag", {"render", "evaluate"}),

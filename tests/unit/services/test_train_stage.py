@@ -12,6 +12,7 @@ import pytest
 from support.shards import random_shard
 
 from schemas.bundle import WEIGHTS
+from schemas.options import Options
 from schemas.problem import Problem
 from services.plan import Plan
 from services.stages import train
@@ -20,7 +21,7 @@ from services.stages.tasks import train_task
 from services.store import Address, Store
 from services.tasks import Task
 
-PLAN = Plan("glass", (), (1.0,), None, 1, 24, 24, "density", 0.75, 0, 4, "tiny")
+PLAN = Plan("glass", (), Options(budgets=(1.0,), width=24, height=24, tail="density", steps=4, network="tiny"))
 
 
 @pytest.fixture(scope="module")
