@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 PixelWeights = Literal["none", "flip"]
 """`none`: every pixel's squared error in display space counts alike; `flip`: as FLIP sees it."""
 
-PIXEL_WEIGHTS: tuple[PixelWeights, ...] = get_args(PixelWeights)
 DEFAULT_WEIGHTS: PixelWeights = "none"
 
 

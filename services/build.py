@@ -22,7 +22,7 @@ from services.progress import Progress
 from services.replay import fine_tuning
 from services.result import BuildResult
 from services.stages.desk import PAGE
-from services.stages.report import Evaluation, write
+from services.stages.making.report import Evaluation, write
 
 
 def build(options: BuildOptions, progress: Progress) -> BuildResult:

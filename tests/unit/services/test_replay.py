@@ -21,6 +21,7 @@ from services.options import BuildOptions
 from services.plan import Plan, PlannedScene
 from services.progress import SilentProgress
 from services.replay import fine_tuning
+from services.stages.label import Shard
 from services.tasks import Source
 
 NO_REGISTRY: Any = None
@@ -130,7 +131,7 @@ def test_the_new_data_set_holds_what_was_replayed_so_that_the_same_build_finds_i
         scene=SimpleNamespace(label="new", held_out=False, digest="digest of new"),
         rendered=SimpleNamespace(view=camera),
         task=SimpleNamespace(artifact="", version=CODE),
-        facts={"shard": {"sha256": written.sha256}},
+        facts=SimpleNamespace(shard=Shard(sha256=written.sha256, bytes=0)),
     )
     store: Any = SimpleNamespace(fetch=lambda artifact: tmp_path / "store")
     write_dataset(made, [view], store, replay)  # the folder of the old data set becomes that of the new one
