@@ -6,12 +6,12 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
-from schemas.glass import DEFAULT_GLASS, GlassReading
 from schemas.licence import MOST_CHARACTERS
 from schemas.limits import LIMITS
-from schemas.network import DEFAULT_NETWORK, NetworkSize
-from schemas.pixel_weights import DEFAULT_WEIGHTS, PixelWeights
-from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, DENSITY_G, TailName
+from schemas.option import Option
+from schemas.options import Options
+from schemas.pixel_weights import DEFAULT_WEIGHTS
+from schemas.tail import BINNED_TAILS
 from schemas.view import ListedView
 
 JobKind = Literal["build", "render", "label", "train", "evaluate"]
@@ -71,71 +71,49 @@ class SceneUse(BaseModel):
         return self
 
 
-class JobSpec(BaseModel):
-    """A job as submitted.
+class JobSpec(Options):
+    """A job as submitted: the options of a build, and what it is made of.
 
     Attributes:
         kind: What it makes.
         name: Bundle that a `build` or `train` publishes a version of.
         scenes: What it is made from; empty where a `train` names a data set.
-        dataset: Data set that a `train` learns from, instead of scenes.
+        dataset: Data set that a `train` learns from, instead of scenes. Its rows were weighted when it was made.
         model: Version that an `evaluate` measures, `name`, `name@alias` or `name@1.2.0`.
-        budgets: Fragments of a frame as multiples of width * height; None: what the captured views call for, between
-            0.05 and 4 times width * height.
-        alpha: Opacity in (0, 1) that every surface gets; None keeps the materials' own.
-        glass: How surfaces that transmit light are read (`schemas.glass`).
-        views_per_scene: How many views are sampled of a scene without cameras of its own.
-        width: Pixels per row.
-        height: Rows.
-        tail: How the fragments beyond k are averaged.
-        g: Steepness of the density tail.
-        network: How much the network reads and computes a pixel.
-        seed: Seed of everything drawn at random.
-        steps: Optimiser steps; None: the trainer's default.
         start_from: Network that the training begins with: `scratch` is none, the weights are drawn by the seed;
             `champion` is that of the job's own name, if there is one yet; else a version, as in `model`. What an alias
             means is decided when the job is submitted: its record names the version.
         replay: Whether what `start_from` was trained on is trained on again, so that it is not forgotten: the views of
             scenes that the job does not have itself.
-        patience: Validations without a better score after which the training stops; 0: never. A fifth of the training
-            scenes is kept out for that.
-        weights: What a pixel's errors count in the rows that are trained on (`schemas.pixel_weights`); those of a data
-            set were weighted when it was made.
         promote: Whether a better version becomes the champion, or stays a candidate; a key without the scope `publish`
             gets the latter.
         priority: Class of the job's tasks in the queues; within a class, jobs share fairly.
     """
 
-    model_config = _STRICT
-
     kind: JobKind
-    name: ModelName | None = None
+    name: Annotated[ModelName | None, Option("Name of the bundle in the registry.", absent="none is made")] = None
     scenes: tuple[SceneUse, ...] = Field(default=(), max_length=LIMITS.scenes)
-    dataset: DatasetId | None = None
-    model: ModelReference | None = None
-    budgets: (
-        Annotated[
-            tuple[Annotated[float, Field(gt=0.0, le=LIMITS.budget)], ...],
-            Field(min_length=1, max_length=LIMITS.budgets),
-        ]
-        | None
-    ) = None
-    alpha: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
-    glass: GlassReading = DEFAULT_GLASS
-    views_per_scene: int = Field(default=3, ge=1, le=LIMITS.views)
-    width: int = Field(default=1430, ge=LIMITS.min_side, le=LIMITS.max_side)
-    height: int = Field(default=960, ge=LIMITS.min_side, le=LIMITS.max_side)
-    tail: TailName = DEFAULT_TAIL
-    g: float = Field(default=DENSITY_G, ge=0.0, le=10.0)
-    network: NetworkSize = DEFAULT_NETWORK
-    seed: int = Field(default=0, ge=0, le=2**31 - 1)
-    steps: Annotated[int, Field(ge=1, le=LIMITS.steps)] | None = None
-    start_from: ModelReference = SCRATCH
-    replay: bool = True
-    patience: int = Field(default=0, ge=0, le=LIMITS.steps)
-    weights: PixelWeights = DEFAULT_WEIGHTS
-    promote: Literal["if-better", "never"] = "if-better"
-    priority: Priority = "normal"
+    dataset: Annotated[DatasetId | None, Option("Data set that a train learns from.", absent="its scenes")] = None
+    model: Annotated[ModelReference | None, Option("Version that an evaluate measures.", absent="none")] = None
+    start_from: Annotated[
+        ModelReference,
+        Option(
+            "Network to begin with: scratch, champion (the name's own), or NAME@ALIAS.",
+            flags=("--from", "--start-from"),
+        ),
+    ] = SCRATCH
+    replay: Annotated[
+        bool, Option("Train again on what the network that is begun with was trained on, so that it is not forgotten.")
+    ] = True
+    promote: Annotated[Literal["if-better", "never"], Option("Whether a better version becomes the champion.")] = (
+        "if-better"
+    )
+    priority: Annotated[Priority, Option("Class of the job's tasks in the queues.")] = "normal"
+
+    @property
+    def options(self) -> Options:
+        """Those of the build."""
+        return Options(**{name: getattr(self, name) for name in Options.model_fields})
 
     @property
     def begins_with(self) -> str | None:
@@ -165,8 +143,4 @@ class JobSpec(BaseModel):
             raise ValueError("a scene is listed twice")
         if self.kind in ("build", "train") and self.scenes and all(use.holdout for use in self.scenes):
             raise ValueError("every scene is held out, so there is none to train on")
-        if self.width * self.height > LIMITS.pixels:
-            raise ValueError(f"{self.width} x {self.height} is more than {LIMITS.pixels} pixels")
-        if self.budgets is not None and min(self.budgets) * self.width * self.height < 1.0:
-            raise ValueError("a budget is less than one fragment")
         return self

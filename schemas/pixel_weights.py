@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 PixelWeights = Literal["none", "flip"]
 """`none`: every pixel's squared error in display space counts alike; `flip`: as FLIP sees it."""
 
-PIXEL_WEIGHTS: tuple[PixelWeights, ...] = get_args(PixelWeights)
 DEFAULT_WEIGHTS: PixelWeights = "none"
-
-WEIGHTS_HELP = "What a pixel's errors count in training: none (all alike) or flip."
 
 
 def without_default(described: dict[str, Any]) -> dict[str, Any]:

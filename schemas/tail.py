@@ -88,9 +88,6 @@ NO_TAIL: Final = -1
 TAIL_HELP = f"One of {', '.join(TAILS)}."
 """For the help of a command's option."""
 
-BUNDLE_TAIL_HELP = f"One of {', '.join(BINNED_TAILS)}."
-"""The same where a bundle is made."""
-
 DEFAULT_TAIL: TailName = "binned-12"
 
 MOST_BINS: Final = max(tail.bins for tail in TAILS.values())

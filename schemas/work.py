@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
+
+from schemas.option import Option
 
 
 class PassWork(BaseModel):
@@ -52,17 +55,16 @@ class PassWork(BaseModel):
 
 
 class Device(BaseModel):
-    """What a bound is stated for.
+    """What a bound is stated for."""
 
-    Attributes:
-        bandwidth: GB/s (1e9 bytes) at which the device reads and writes.
-        fill_rate: Gfragments/s that it shades and writes.
-    """
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    bandwidth: float = Field(default=500.0, gt=0.0)
-    fill_rate: float = Field(default=50.0, gt=0.0)
+    bandwidth: Annotated[
+        float, Field(gt=0.0), Option("GB/s (1e9 bytes) at which bounds of frame times have the device read and write.")
+    ] = 500.0
+    fill_rate: Annotated[
+        float, Field(gt=0.0), Option("Gfragments/s that bounds of frame times have it shade and write.")
+    ] = 50.0
 
     def bound(self, passes: Iterable[PassWork]) -> float:
         """Milliseconds that a frame takes at least if nothing is cached; passes follow each other.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from labeller.budgets import MOST_HELD, default_budgets
 from schemas.problem import ExitCode, Problem
@@ -28,11 +27,11 @@ def decided(plan: Plan, views: Sequence[RenderedView], progress: Progress) -> Pl
         Problem: A bundle is to be built, and every budget holds all fragments of every view.
     """
     judged = [view for view in views if view.scene.held_out] or list(views)
-    loads = [view.total / plan.pixels for view in judged]
+    loads = [view.total / plan.options.pixels for view in judged]
     if not plan.factors:
-        plan = replace(plan, factors=default_budgets(loads))
+        plan = plan.with_options(budgets=default_budgets(loads))
         progress.note(said_defaults(plan.factors, loads))
-    everything = [view.total / plan.pixels for view in views]
+    everything = [view.total / plan.options.pixels for view in views]
     if plan.is_scored and holds_all(plan.factors, everything):
         raise Problem(said_complete(plan.factors, everything), remedy(everything), ExitCode.CHECK_FAILED)
     if holds_all(plan.factors, loads):

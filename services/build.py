@@ -8,11 +8,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from schemas.bundle import load_manifest
-from schemas.glass import DEFAULT_GLASS
 from schemas.licence import verdict
-from schemas.network import DEFAULT_NETWORK
-from schemas.pixel_weights import DEFAULT_WEIGHTS
 from services import pipeline
+from services.flags import written
 from services.inline import InlineRunner
 from services.local import open_local
 from services.local_datasets import write_dataset
@@ -24,7 +22,7 @@ from services.progress import Progress
 from services.replay import fine_tuning
 from services.result import BuildResult
 from services.stages.desk import PAGE
-from services.stages.report import Evaluation, write
+from services.stages.making.report import Evaluation, write
 
 
 def build(options: BuildOptions, progress: Progress) -> BuildResult:
@@ -77,25 +75,14 @@ def _write_report(path: Path, options: BuildOptions, built: Built, runner: Inlin
     write(path, data, shown)
 
 
-def command_line(options: BuildOptions) -> str:
+def command_line(asked: BuildOptions) -> str:
     """The command that asks for this build again."""
-    parts = ["diaphane", "build", *map(str, options.scenes)]
-    if options.budgets is not None:
-        parts += ["--budgets", ",".join(f"{budget:g}" for budget in options.budgets)]
-    parts += ["--name", options.name, "--size", f"{options.width}x{options.height}"]
-    parts += ["--alpha", f"{options.alpha:g}"] if options.alpha is not None else []
-    parts += ["--glass", options.glass] if options.glass != DEFAULT_GLASS else []
-    for scene in options.holdout:
+    parts = ["diaphane", "build", *map(str, asked.scenes), "--name", asked.name]
+    for scene in asked.holdout:
         parts += ["--holdout", str(scene)]
-    for scene, licence in options.licences.items():
+    for scene, licence in asked.licences.items():
         parts += ["--licence", f"{scene}={licence}"]
-    parts += ["--views", str(options.views)] if options.views is not None else []
-    parts += ["--views-per-scene", str(options.views_per_scene), "--tail", options.tail, "--g", f"{options.g:g}"]
-    parts += ["--seed", str(options.seed)]
-    parts += ["--steps", str(options.steps)] if options.steps is not None else []
-    parts += ["--network", options.network] if options.network != DEFAULT_NETWORK else []
-    parts += ["--patience", str(options.patience)] if options.patience else []
-    parts += ["--weights", options.weights] if options.weights != DEFAULT_WEIGHTS else []
-    parts += ["--from", options.start] if options.start is not None else []
-    parts += ["--replay", str(options.replay)] if options.replay is not None else []
-    return shlex.join(parts)
+    parts += ["--views", str(asked.views)] if asked.views is not None else []
+    parts += ["--from", asked.start] if asked.start is not None else []
+    parts += ["--replay", str(asked.replay)] if asked.replay is not None else []
+    return shlex.join([*parts, *written(asked.options)])

@@ -2,42 +2,20 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from schemas.skips import LABELLED_VIEWS
 from services.measured import Measured
 from services.progress import Progress, Stage
 from services.registry import Registry
 from services.sources import materialise
 from services.stages import bodies
-from services.stages.desk import Desk, load_facts
+from services.stages.catalogue import STAGES
+from services.stages.desk import Desk
+from services.stages.train import TRAIN
 from services.storage import Storage
-from services.tasks import Facts, StageName, Task
-
-TITLES: dict[StageName, str] = {
-    "scene": "read scenes",
-    "render": "capture fragments",
-    "label": "error curves",
-    "train": "train",
-    "export": "export and parity",
-    "evaluate": "evaluate pictures",
-    "report": "report",
-}
-
-
-def skipped_title(task: Task) -> str:
-    """What is counted when a task's artifact is there already."""
-    titles: dict[StageName, str] = {
-        "scene": "scenes already read",
-        "render": "views already captured",
-        "label": LABELLED_VIEWS,
-        "train": "models already trained",
-        "export": "bundles already exported",
-        "evaluate": f"{task.params.get('kind')} pictures already rendered",
-        "report": "reports already written",
-    }
-    return titles[task.stage]
+from services.tasks import FACTS, JsonFacts, StageName, Task
 
 
 class InlineRunner:
@@ -59,12 +37,12 @@ class InlineRunner:
         """Whether any artifact was made."""
         self._desk = Desk(storage.store, lambda source: materialise(source, storage.blobs, storage.store.root / "tmp"))
 
-    def map(self, stage: StageName, tasks: Sequence[Task]) -> list[Facts | None]:
+    def map(self, stage: StageName, tasks: Sequence[Task]) -> list[JsonFacts | None]:
         """See `services.tasks.Runner`; a task that fails ends the build with its error."""
-        facts: list[Facts | None] = []
+        facts: list[JsonFacts | None] = []
         if stage == "train":
             return [self._train(task) for task in tasks]
-        with self.progress.stage(TITLES[stage], len(tasks)) as bar:
+        with self.progress.stage(STAGES[stage].title, len(tasks)) as bar:
             for task in tasks:
                 notes: list[str] = []
                 facts.append(self._make(task, _Last(notes)))
@@ -75,18 +53,19 @@ class InlineRunner:
         """See `services.tasks.Runner`."""
         return body()
 
-    def _train(self, task: Task) -> Facts:
+    def _train(self, task: Task) -> JsonFacts:
         """One long task: its bar counts thousandths, not tasks."""
-        with self.progress.stage(TITLES["train"], _PARTS) as bar:
+        with self.progress.stage(TRAIN.title, _PARTS) as bar:
             return self._make(task, _Fractions(bar))
 
-    def _make(self, task: Task, report: Callable[[float, str], None]) -> Facts:
+    def _make(self, task: Task, report: Callable[[float, str], None]) -> JsonFacts:
         if self.store.get(task.address) is None:
             self.worked = True
             bodies.make_at(self._desk, task, report)
         else:
-            self.progress.skipped(skipped_title(task))
-        return load_facts(self.store.path(task.address))
+            self.progress.skipped(STAGES[task.stage].known(task))
+        facts: JsonFacts = json.loads((self.store.path(task.address) / FACTS).read_text(encoding="utf-8"))
+        return facts
 
 
 class _Last:

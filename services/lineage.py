@@ -19,6 +19,7 @@ from services.fine_tuning import check_labels, is_replayed, refuse_known, scenes
 from services.plan import Plan, source_of_version
 from services.registry import Registry
 from services.stages.inputs import METRIC, trained_on
+from services.stages.label import LABEL
 from services.store import Address, MissingArtifact, Store
 
 _SETTINGS = ("tail", "g", "metric", "seed", "weights")
@@ -40,7 +41,13 @@ class Own:
     @classmethod
     def of_plan(cls, plan: Plan) -> Own:
         """The scenes of a plan."""
-        labels = {"tail": plan.tail, "g": plan.g, "metric": METRIC, "seed": plan.seed, "weights": plan.weights}
+        labels = {
+            "tail": plan.options.tail,
+            "g": plan.options.g,
+            "metric": METRIC,
+            "seed": plan.options.seed,
+            "weights": plan.options.weights,
+        }
         return cls(scenes_of(plan), labels)
 
     @classmethod
@@ -91,9 +98,9 @@ def begin_with(plan: Plan, own: Own, reference: str, replay: bool, registry: Reg
     again = [shard for shard in shards if is_replayed(own.scenes, names.get(shard.scene, shard.scene), shard.scene)]
     lost = [name for name, digest in learned.items() if digest not in found and is_replayed(own.scenes, name, digest)]
     for shard in again[:1]:  # those of one training are labelled alike: the first one speaks for all
-        made = {"weights": DEFAULT_WEIGHTS, **_made_from(store, shard.artifact, called).params}
+        made = LABEL.params.model_validate(_made_from(store, shard.artifact, called).params)
         remedy = "Give the job the same settings, or leave out the replay (--no-replay)."
-        check_labels(called, {name: made[name] for name in _SETTINGS}, own.labels, remedy)
+        check_labels(called, {name: getattr(made, name) for name in _SETTINGS}, own.labels, remedy)
     begun = replace(
         plan,
         start=source_of_version(version),

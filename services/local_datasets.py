@@ -38,7 +38,7 @@ def write_dataset(folder: Path, views: Sequence[LabelledView], store: Store, rep
     folder.mkdir(parents=True, exist_ok=True)
     members = [_member(view) for view in views]
     for view, member in zip(views, members, strict=True):
-        _provide(store.fetch(view.task.artifact) / SHARD, folder / member.file, view.facts["shard"]["sha256"])
+        _provide(store.fetch(view.task.artifact) / SHARD, folder / member.file, view.facts.shard.sha256)
     for entry in () if replay is None else replay.entries:
         assert replay is not None
         _provide(replay.dataset.folder / entry.file, folder / entry.file, entry.sha256)
@@ -49,7 +49,7 @@ def write_dataset(folder: Path, views: Sequence[LabelledView], store: Store, rep
 
 
 def _member(view: LabelledView) -> Member:
-    camera, sha256 = view.rendered.view, view.facts["shard"]["sha256"]
+    camera, sha256 = view.rendered.view, view.facts.shard.sha256
     readable = re.sub(r"[^A-Za-z0-9._-]+", "_", f"{view.scene.label}-{camera.name}").strip("._")
     return Member(
         file=f"{readable}-{sha256[:12]}{_SUFFIX}",

@@ -11,12 +11,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePath
 
 from schemas.bundle import Manifest
-from schemas.glass import DEFAULT_GLASS
 from schemas.licence import commercial_use, verdict
 from schemas.measurement import Measurement
-from schemas.network import DEFAULT_NETWORK
-from schemas.pixel_weights import DEFAULT_WEIGHTS
 from services import summary
+from services.flags import written
 from services.plan import Plan
 
 _WORST_SCENES = 5
@@ -68,17 +66,8 @@ def command_of(plan: Plan) -> str:
     parts = ["diaphane", "build", *(PurePath(scene.source.root).name for scene in named), "--name", plan.name]
     for scene in named:
         parts += ["--holdout", PurePath(scene.source.root).name] if scene.held_out else []
-    parts += ["--budgets", ",".join(f"{factor:g}" for factor in plan.factors)]
-    parts += ["--size", f"{plan.width}x{plan.height}", "--views-per-scene", str(plan.views_per_scene)]
-    parts += ["--alpha", f"{plan.alpha:g}"] if plan.alpha is not None else []
-    parts += ["--glass", plan.glass] if plan.glass != DEFAULT_GLASS else []
-    parts += ["--tail", plan.tail, "--seed", str(plan.seed)]
-    parts += ["--steps", str(plan.steps)] if plan.steps is not None else []
-    parts += ["--network", plan.network] if plan.network != DEFAULT_NETWORK else []
-    parts += ["--patience", str(plan.patience)] if plan.patience else []
-    parts += ["--weights", plan.weights] if plan.weights != DEFAULT_WEIGHTS else []
     parts += ["--from", f"sha256:{plan.start.digest[:12]}"] if plan.start is not None else []
-    return shlex.join(parts)
+    return shlex.join([*parts, *written(plan.options)])
 
 
 def _scenes(title: str, scenes: Mapping[str, str], licences: Mapping[str, str]) -> str:

@@ -15,83 +15,61 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
+
+from pydantic import BaseModel
 
 from schemas.bundle import TailSpec
 from schemas.glass import DEFAULT_GLASS, GLASS_READINGS, GlassReading
 from schemas.licence import tidy
 from schemas.limits import LIMITS
-from schemas.network import DEFAULT_NETWORK, SIZES, NetworkSize
-from schemas.pixel_weights import DEFAULT_WEIGHTS, PIXEL_WEIGHTS, PixelWeights
+from schemas.options import Options
 from schemas.problem import ExitCode, Problem
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, DENSITY_G, TAIL_NAMES, TailName
+from services.flags import checked
 from services.registry import check_name
 
+M = TypeVar("M", bound=BaseModel)
 Name = TypeVar("Name", bound=str)
 
 
 @dataclass(frozen=True, slots=True)
 class BuildOptions:
-    """Everything that decides the outcome of a build.
+    """What `diaphane build` is asked for.
 
     Attributes:
         scenes: USD files, in the order given.
         name: Name of the bundle in the registry.
-        budgets: Fragments of a frame as multiples of width * height, ascending, without duplicates; None: what the
-            captured views call for (`labeller.budgets`).
+        options: What decides the outcome beside the scenes; the tail is one with depth bins.
         holdout: Those of `scenes` that are evaluated on and never trained on. Empty: chosen by `default_holdout`.
         licences: Scene -> its licence and whom to name for it, instead of what its stage states.
-        alpha: Opacity in (0, 1) that every surface gets; None keeps the materials' own.
-        glass: How surfaces that transmit light are read.
         views: JSON file with views; None: the stage's cameras, else sampled ones.
-        views_per_scene: How many views are sampled of a scene without cameras of its own.
-        width: Pixels per row.
-        height: Rows.
-        tail: How the fragments beyond k are averaged (METHOD.md section 2); one with depth bins.
-        g: Steepness of the density tail.
-        seed: Seed of everything drawn at random: views, sampled pixels, weights, batches.
-        steps: Optimiser steps; None: the trainer's default.
-        network: Size of the network.
-        patience: Validations without a better score after which the training stops; 0: never.
-        weights: What a pixel's errors count in the rows that are trained on.
         start: Bundle whose weights the training begins with: a folder, or a reference of the registry.
         replay: Folder of a data set that is trained on as well, so that `start` does not forget it; None: that of the
             bundle's name, where there is one.
         state: Folder of artifacts, registry and reports.
 
     Raises:
-        Problem: An option is out of range, or a scene is missing or named twice.
+        Problem: The options do not fit each other, or a scene is missing or named twice.
     """
 
     scenes: tuple[Path, ...]
     name: str
-    budgets: tuple[float, ...] | None = None
+    options: Options = field(default_factory=Options)
     holdout: tuple[Path, ...] = ()
     licences: Mapping[Path, str] = field(default_factory=dict)
-    alpha: float | None = None
-    glass: GlassReading = DEFAULT_GLASS
     views: Path | None = None
-    views_per_scene: int = 3
-    width: int = 1430
-    height: int = 960
-    tail: TailName = DEFAULT_TAIL
-    g: float = DENSITY_G
-    seed: int = 0
-    steps: int | None = None
-    network: NetworkSize = DEFAULT_NETWORK
-    patience: int = 0
-    weights: PixelWeights = DEFAULT_WEIGHTS
     start: str | None = None
     replay: Path | None = None
     state: Path = field(default=Path(".diaphane"))
 
     def __post_init__(self) -> None:
         check_name(self.name)
-        check_bundle_tail(self.tail)
+        check_bundle_tail(self.options.tail)
         _check_scenes(self.scenes)
-        _check_numbers(self)
-        if self.budgets is not None:
-            object.__setattr__(self, "budgets", tuple(sorted(set(self.budgets))))
+        check_bundle(self.start, "--from")
+        if self.replay is not None and self.start is None:
+            raise Problem("--replay needs --from: there is nothing to forget without it.", "Change that option.")
         object.__setattr__(self, "holdout", _resolve_holdout(self.holdout, self.scenes))
         if self.views is not None and not self.views.is_file():
             raise Problem(
@@ -112,6 +90,23 @@ class BuildOptions:
             depth = next(d for d in range(1, len(parts) + 1) if _is_unique(parts[-d:], self.scenes))
             labels[scene] = "/".join(parts[-depth:])
         return labels
+
+
+def asked(model: type[M], fields: Mapping[str, Any]) -> M:
+    """The options of a build, or a job, of these fields.
+
+    Args:
+        model: `schemas.options.Options`, or what has its fields.
+        fields: Name -> value.
+
+    Raises:
+        Problem: They cannot be.
+    """
+    budgets = fields.get("budgets")
+    if budgets is not None:
+        width, height = (fields.get(side, Options.model_fields[side].default) for side in ("width", "height"))
+        _check_budgets(budgets, (width, height) if min(width, height) > 0 else None)
+    return checked(model, fields)
 
 
 def check_budget(budget: float, option: str, size: tuple[int, int] | None = None) -> None:
@@ -153,7 +148,7 @@ def check_steepness(g: float | None, *, has_bundle: bool, is_tail_named: bool, o
     """
     if g is None:
         return
-    _require(math.isfinite(g) and 0.0 <= g <= 10.0, f"--g {g}", "is not between 0 and 10")
+    checked(Options, {"g": g})
     if has_bundle and not is_tail_named:
         raise Problem(
             f"--g {g:g} is the steepness of a tail, and none is named: the bundle brings its own, with its own g.",
@@ -236,18 +231,6 @@ def check_bundle(reference: str | None, option: str) -> None:
         raise Problem(f"{option} is empty.", f"Name a folder, or a bundle of the registry: {option} glass@champion.")
 
 
-def parse_budgets(text: str) -> tuple[float, ...]:
-    """Comma-separated budgets, as in `.5,1,2`.
-
-    Raises:
-        Problem: An entry is not a number.
-    """
-    try:
-        return tuple(float(part) for part in text.split(",") if part.strip())
-    except ValueError:
-        raise Problem(f"--budgets '{text}' is not a list of numbers.", "Write it like --budgets .5,1,2.") from None
-
-
 def parse_licences(texts: Sequence[str], scenes: Sequence[str]) -> dict[str, str]:
     """Licences of scenes, with whom to name for them.
 
@@ -279,18 +262,6 @@ def parse_licences(texts: Sequence[str], scenes: Sequence[str]) -> dict[str, str
     return {**of_all, **own}
 
 
-def parse_size(text: str) -> tuple[int, int]:
-    """Width and height in pixels, as in `1430x960`.
-
-    Raises:
-        Problem: It is not two whole numbers with an x between them.
-    """
-    width, x, height = text.lower().partition("x")
-    if not (x and width.isascii() and width.isdigit() and height.isascii() and height.isdigit()):
-        raise Problem(f"--size '{text}' is not a size in pixels.", "Write it like --size 1430x960.")
-    return int(width), int(height)
-
-
 def parse_tail(text: str, option: str = "--tail") -> TailName:
     """The tail of that name.
 
@@ -304,15 +275,6 @@ def parse_tail(text: str, option: str = "--tail") -> TailName:
     return _named(text, TAIL_NAMES, "There is no tail", f"{option} {DEFAULT_TAIL}")
 
 
-def parse_network(text: str) -> NetworkSize:
-    """The size of that name.
-
-    Raises:
-        Problem: There is none.
-    """
-    return _named(text, SIZES, "There is no network", f"--network {DEFAULT_NETWORK}")
-
-
 def parse_glass(text: str) -> GlassReading:
     """The reading of glass of that name.
 
@@ -320,15 +282,6 @@ def parse_glass(text: str) -> GlassReading:
         Problem: There is none.
     """
     return _named(text, GLASS_READINGS, "There is no reading of glass", f"--glass {DEFAULT_GLASS}")
-
-
-def parse_weights(text: str) -> PixelWeights:
-    """The weights of that name.
-
-    Raises:
-        Problem: There are none.
-    """
-    return _named(text, PIXEL_WEIGHTS, "There are no weights", "--weights flip")
 
 
 def default_holdout(scenes: Sequence[Path]) -> tuple[Path, ...]:
@@ -365,35 +318,13 @@ def _check_scenes(scenes: tuple[Path, ...]) -> None:
         raise Problem(f"The scene {twice[0].name} is given more than once ({twice[0]}).", "Name each scene once.")
 
 
-def _check_numbers(o: BuildOptions) -> None:
-    size, views = f"--size {o.width}x{o.height}", f"--views-per-scene {o.views_per_scene}"
-    _require(min(o.width, o.height) >= LIMITS.min_side, size, f"is below {LIMITS.min_side} pixels a side")
-    _require(max(o.width, o.height) <= LIMITS.max_side, size, f"is beyond {LIMITS.max_side} pixels a side")
-    _require(o.width * o.height <= LIMITS.pixels, size, f"is beyond {LIMITS.pixels} pixels")
-    if o.budgets is not None:
-        _check_budgets(o.budgets, (o.width, o.height))
-    check_bundle(o.start, "--from")
-    _require(o.alpha is None or 0.0 < o.alpha < 1.0, f"--alpha {o.alpha}", "is not between 0 and 1 (both excluded)")
-    _require(1 <= o.views_per_scene <= LIMITS.views, views, f"is not 1..{LIMITS.views}")
-    _require(math.isfinite(o.g) and 0.0 <= o.g <= 10.0, f"--g {o.g}", "is not between 0 and 10")
-    _require(0 <= o.seed < 2**63, f"--seed {o.seed}", "is not a whole number from 0 to 2^63 - 1")
-    _require(o.steps is None or 1 <= o.steps <= LIMITS.steps, f"--steps {o.steps}", f"is not 1..{LIMITS.steps}")
-    _require(0 <= o.patience <= LIMITS.steps, f"--patience {o.patience}", f"is not 0..{LIMITS.steps}")
-    _require(o.replay is None or o.start is not None, "--replay", "needs --from: there is nothing to forget without it")
-
-
-def _check_budgets(budgets: tuple[float, ...], size: tuple[int, int]) -> None:
+def _check_budgets(budgets: Sequence[float], size: tuple[int, int] | None) -> None:
     if not budgets:
         raise Problem("No budget was given.", "Give at least one, --budgets .5,1,2, or leave out --budgets.")
     if len(budgets) > LIMITS.budgets:
         raise Problem(f"{len(budgets)} budgets are not possible.", f"Give 1 to {LIMITS.budgets}.")
     for budget in budgets:
         check_budget(budget, "--budgets .5,1,2", size)
-
-
-def _require(holds: bool, option: str, fault: str) -> None:
-    if not holds:
-        raise Problem(f"{option} {fault}.", "Change that option.")
 
 
 def _resolve_holdout(wanted: tuple[Path, ...], scenes: tuple[Path, ...]) -> tuple[Path, ...]:

@@ -21,8 +21,9 @@ from services.model_card import command_of, model_card
 from services.plan import Plan, plan_of_job, source_of_version
 from services.records import Bundle, EvaluatedView, LabelledView, RenderedView, SceneEntry
 from services.registry import Publication, bundle_digest
-from services.stages import tasks
 from services.stages.desk import BUNDLE, PAGE
+from services.stages.evaluate import EVALUATE
+from services.stages.report import REPORT
 from services.tasks import Runner, Source, Task
 
 
@@ -73,7 +74,7 @@ def build(plan: Plan, runner: Runner) -> Built:
 
 
 def report_data(built: Built, command: str, created: str, skipped: Mapping[str, int]) -> dict[str, Any]:
-    """What the report shows, JSON, apart from what its stage finds out itself (see `services.stages.report.write`)."""
+    """What the report shows, JSON, apart from what `services.stages.making.report.write` finds out itself."""
     judged = [view.labelled for view in built.evaluated]
     scenes = [_scene_summary(scene, [view.rendered for view in built.views]) for scene in built.scenes]
     return {
@@ -86,11 +87,11 @@ def report_data(built: Built, command: str, created: str, skipped: Mapping[str, 
         "registry": built.registered.model_dump(mode="json"),
         "skipped": dict(skipped),
         "provenance": {
-            "seed": built.plan.seed,
-            "tail": built.plan.tail,
-            "g": built.plan.g,
-            "alpha": built.plan.alpha,
-            "bundle": built.bundle.digest,
+            "seed": built.plan.options.seed,
+            "tail": built.plan.options.tail,
+            "g": built.plan.options.g,
+            "alpha": built.plan.options.alpha,
+            "bundle": built.bundle.facts.digest,
             "scenes": {scene.label: scene.digest for scene in built.scenes},
         },
     }
@@ -147,7 +148,7 @@ def _build_job(plan: Plan, runner: Runner, job: JobContext) -> dict[str, Any]:
     labels = sorted({m.scene for m in held_out})
     data = report_data(built, f"diaphane jobs show {job.id}", job.created, runner.progress.skips)
     shown = [(view.labelled.scene.label, task) for view in built.evaluated for task in view.tasks]
-    report = _keep_report(runner, tasks.report_task(plan.name, data, shown))
+    report = _keep_report(runner, REPORT.ask(plan.name, data, shown))
     return {
         "reference": built.registered.reference,
         "score": built.registered.score,
@@ -288,8 +289,8 @@ def _publish(
     evaluation = {
         "views": sorted(view.labelled.rendered.task.address.key for view in held_out),
         "budgets": list(plan.budgets),
-        "tail": plan.tail,
-        "g": plan.g,
+        "tail": plan.options.tail,
+        "g": plan.options.g,
     }
 
     def body() -> dict[str, Any]:
@@ -359,7 +360,7 @@ def _record(runner: Runner, evaluated: Sequence[EvaluatedView], reference: str) 
         for view in evaluated:
             digests = {view.labelled.scene.label: view.labelled.scene.digest}
             for task in view.tasks:
-                kind = task.params["kind"]
+                kind = EVALUATE.params_of(task).kind
                 own = [m for m in view.measurements if (m.technique == summary.BUNDLE) == (kind == "bundle")]
                 model = reference if kind == "bundle" else None
                 runner.measured.record(task.artifact, own, digests, model, runner.job_id)
@@ -375,8 +376,8 @@ def _record_dataset(plan: Plan, runner: Runner, views: Sequence[LabelledView]) -
             scene_digest=view.scene.digest,
             view=view.rendered.view.name,
             artifact=view.task.artifact,
-            sha256=view.facts["shard"]["sha256"],
-            bytes=view.facts["shard"]["bytes"],
+            sha256=view.facts.shard.sha256,
+            bytes=view.facts.shard.bytes,
         )
         for view in views
         if not view.scene.held_out
@@ -391,7 +392,7 @@ def _record_dataset(plan: Plan, runner: Runner, views: Sequence[LabelledView]) -
 
 def _keep_report(runner: Runner, task: Task) -> str | None:
     """The page as a blob, so that it can be asked for by its hash; None if it could not be written."""
-    (facts,) = runner.map("report", [task])
+    (facts,) = runner.map(REPORT.name, [task])
     if facts is None:
         return None
 
@@ -414,8 +415,8 @@ def _scene_summary(scene: SceneEntry, views: Sequence[RenderedView]) -> SceneSum
     return SceneSummary(
         label=scene.label,
         held_out=scene.held_out,
-        views=len(scene.views),
-        triangles=scene.triangles,
+        views=len(scene.facts.views),
+        triangles=scene.facts.triangles,
         fragments=sum(view.total for view in views if view.scene.label == scene.label),
-        warnings=scene.warnings,
+        warnings=scene.facts.warnings,
     )

@@ -7,12 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from schemas.glass import DEFAULT_GLASS, GlassReading
+from schemas.glass import DEFAULT_GLASS
 from schemas.job import JobSpec
-from schemas.network import DEFAULT_NETWORK, NetworkSize
-from schemas.pixel_weights import DEFAULT_WEIGHTS, PixelWeights
+from schemas.options import Options
+from schemas.pixel_weights import DEFAULT_WEIGHTS
 from schemas.service import SceneRecord, VersionRecord
-from schemas.tail import TailName
 from schemas.view import ListedView
 from services.options import BuildOptions
 from services.tasks import Source
@@ -44,22 +43,10 @@ class Plan:
     Attributes:
         name: Name of the bundle; empty where none is made.
         scenes: The scenes, in the order given.
-        factors: Budgets as multiples of width * height, ascending; empty until `services.budgets.decided` where none
+        options: What decides the outcome beside the scenes; without budgets until `services.budgets.decided` where none
             were given.
-        alpha: Opacity that every surface gets; None keeps the materials' own.
-        glass: How surfaces that transmit light are read.
-        views_per_scene: How many views are sampled of a scene without cameras.
-        width: Pixels per row.
-        height: Rows.
-        tail: How the fragments beyond k are averaged.
-        g: Steepness of the density tail.
-        seed: Seed of everything drawn at random.
-        steps: Optimiser steps; None: the trainer's default.
-        network: Size of the network.
         from_champion: Whether the training begins with the champion's weights.
         promote: Whether a better version becomes the champion.
-        patience: Validations without a better score after which the training stops; 0: never.
-        weights: What a pixel's errors count in the rows that are trained on.
         start: Bundle whose weights the training begins with; None: see `from_champion`.
         replay: Shards of an earlier data set in a folder that are trained on as well.
         replayed: Digest of the scene and label artifact of every shard of earlier jobs that is trained on as well.
@@ -70,21 +57,9 @@ class Plan:
 
     name: str
     scenes: tuple[PlannedScene, ...]
-    factors: tuple[float, ...]
-    alpha: float | None
-    views_per_scene: int
-    width: int
-    height: int
-    tail: TailName
-    g: float
-    seed: int
-    steps: int | None
-    network: NetworkSize = DEFAULT_NETWORK
+    options: Options = field(default_factory=Options)
     from_champion: bool = False
     promote: bool = True
-    patience: int = 0
-    weights: PixelWeights = DEFAULT_WEIGHTS
-    glass: GlassReading = DEFAULT_GLASS
     start: Source | None = None
     replay: Source | None = None
     replayed: tuple[tuple[str, str], ...] = ()
@@ -93,47 +68,51 @@ class Plan:
     is_scored: bool = True
 
     @property
-    def pixels(self) -> int:
-        """Of a picture."""
-        return self.width * self.height
+    def factors(self) -> tuple[float, ...]:
+        """Budgets as multiples of width * height, ascending; empty until they are decided."""
+        return self.options.budgets or ()
 
     @property
     def budgets(self) -> tuple[int, ...]:
         """Budgets in fragments, F, in the order of the factors."""
         assert self.factors, "budgets are decided once the views are captured"
-        return tuple(int(factor * self.pixels) for factor in self.factors)
+        return tuple(int(factor * self.options.pixels) for factor in self.factors)
 
     @property
     def settings(self) -> dict[str, Any]:
         """What a user set, for provenance and data sets."""
+        options = self.options
         return {
-            "alpha": self.alpha,
-            "size": [self.width, self.height],
+            "alpha": options.alpha,
+            "size": [options.width, options.height],
             "budgets": list(self.factors),
-            "tail": self.tail,
-            "g": self.g,
-            "seed": self.seed,
-            **({"glass": self.glass} if self.glass != DEFAULT_GLASS else {}),
-            **({"weights": self.weights} if self.weights != DEFAULT_WEIGHTS else {}),
+            "tail": options.tail,
+            "g": options.g,
+            "seed": options.seed,
+            **({"glass": options.glass} if options.glass != DEFAULT_GLASS else {}),
+            **({"weights": options.weights} if options.weights != DEFAULT_WEIGHTS else {}),
         }
 
     def described_by(self, settings: Mapping[str, Any]) -> Plan:
         """The same plan with the settings that a data set was made with."""
         width, height = settings["size"]
-        return replace(
-            self,
+        return self.with_options(
             alpha=settings["alpha"],
             width=width,
             height=height,
-            factors=tuple(settings["budgets"]),
+            budgets=tuple(settings["budgets"]),
             tail=settings["tail"],
             g=settings["g"],
             glass=settings.get("glass", DEFAULT_GLASS),
             weights=settings.get("weights", DEFAULT_WEIGHTS),
         )
 
+    def with_options(self, **changes: Any) -> Plan:
+        """The same plan with some options changed."""
+        return replace(self, options=self.options.model_copy(update=changes))
 
-def plan_of_build(options: BuildOptions) -> Plan:
+
+def plan_of_build(asked: BuildOptions) -> Plan:
     """The plan of a local build: scenes are the user's own files, and resolve as they do for any USD program.
 
     Raises:
@@ -144,29 +123,13 @@ def plan_of_build(options: BuildOptions) -> Plan:
     from renderer.views import listed_views
 
     scenes = []
-    for path in options.scenes:
+    for path in asked.scenes:
         root = path.resolve()
         source = Source(digest=scene_digest(path), root=root.name, folder=str(root.parent), trusted=True)
-        listed = () if options.views is None else listed_views(options.views, path)
-        licence = options.licences.get(path)
-        scenes.append(PlannedScene(options.labels[path], source, path in options.holdout, listed, licence))
-    return Plan(
-        name=options.name,
-        scenes=tuple(scenes),
-        factors=options.budgets or (),
-        alpha=options.alpha,
-        views_per_scene=options.views_per_scene,
-        width=options.width,
-        height=options.height,
-        tail=options.tail,
-        g=options.g,
-        seed=options.seed,
-        steps=options.steps,
-        network=options.network,
-        patience=options.patience,
-        weights=options.weights,
-        glass=options.glass,
-    )
+        listed = () if asked.views is None else listed_views(asked.views, path)
+        licence = asked.licences.get(path)
+        scenes.append(PlannedScene(asked.labels[path], source, path in asked.holdout, listed, licence))
+    return Plan(asked.name, tuple(scenes), asked.options)
 
 
 def plan_of_job(spec: JobSpec, scenes: Mapping[str, SceneRecord]) -> Plan:
@@ -186,19 +149,7 @@ def plan_of_job(spec: JobSpec, scenes: Mapping[str, SceneRecord]) -> Plan:
     return Plan(
         name=spec.name or "",
         scenes=tuple(planned),
-        factors=tuple(sorted(set(spec.budgets or ()))),
-        alpha=spec.alpha,
-        views_per_scene=spec.views_per_scene,
-        width=spec.width,
-        height=spec.height,
-        tail=spec.tail,
-        g=spec.g,
-        seed=spec.seed,
-        steps=spec.steps,
-        network=spec.network,
-        patience=spec.patience,
-        weights=spec.weights,
-        glass=spec.glass,
+        options=spec.options,
         from_champion=spec.start_from == "champion",
         promote=spec.promote == "if-better",
         is_scored=spec.kind == "build",

@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from schemas.bundle import network_digest
 from schemas.measurement import Certificate, Measurement, TrainingPoint
 from schemas.view import View
-from services.tasks import Facts, Source, Task
+from services.stages.export import ExportFacts
+from services.stages.label import LabelFacts
+from services.stages.scene import SceneFacts
+from services.tasks import Source, Task
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,22 +21,14 @@ class SceneEntry:
         label: Unique short name.
         source: Its files.
         held_out: Whether it is evaluated on and never trained on.
-        views: Its views.
-        triangles: Number of triangles.
-        opaque: Whether nothing in it is transparent.
-        content: Hash of the root file alone.
-        warnings: What of the file was not supported or was missing.
+        facts: What was found in it: its views, triangles, warnings.
         licence: Its licence and whom to name for it; empty: none is known.
     """
 
     label: str
     source: Source
     held_out: bool
-    views: tuple[View, ...]
-    triangles: int
-    opaque: bool
-    content: str
-    warnings: tuple[str, ...]
+    facts: SceneFacts
     licence: str
 
     @property
@@ -77,7 +72,7 @@ class LabelledView:
 
     rendered: RenderedView
     task: Task
-    facts: Facts
+    facts: LabelFacts
     certificates: tuple[Certificate, ...]
 
     @property
@@ -91,23 +86,18 @@ class Bundle:
     """An exported bundle.
 
     Attributes:
+        name: Name that it is published under.
         task: That exported it.
         train: That trained it.
-        digest: Over its files, before it has a card.
-        files: Name -> hex sha256.
+        facts: Its digest and files, before it has a card.
         history: How its training went.
     """
 
+    name: str
     task: Task
     train: Task
-    digest: str
-    files: dict[str, str]
+    facts: ExportFacts
     history: tuple[TrainingPoint, ...]
-
-    @property
-    def name(self) -> str:
-        """Name that it is published under."""
-        return str(self.task.params["name"])
 
     @property
     def source(self) -> Source:
@@ -117,7 +107,7 @@ class Bundle:
     @property
     def network(self) -> str:
         """Digest of its network, the same before and after it has a card."""
-        return network_digest(self.files)
+        return network_digest(self.facts.files)
 
 
 @dataclass(frozen=True, slots=True)

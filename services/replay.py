@@ -68,7 +68,7 @@ def fine_tuning(
         source, manifest = _bundle(options.start, registry)
         seen |= manifest.provenance.scenes
         plan = replace(plan, start=source, licences=manifest.provenance.known_licences)
-        if manifest.hidden != TrainConfig.sized(plan.network).hidden:
+        if manifest.hidden != TrainConfig.sized(plan.options.network).hidden:
             units = "-".join(map(str, manifest.hidden))
             progress.note(
                 f"The network keeps the size of {options.start}, {units} units; --network does not change it."
@@ -111,7 +111,10 @@ def _replay(folder: Path, plan: Plan) -> Replay | None:
     check_labels(
         f"The data set {folder}",
         _settings(dataset.index.labels, dataset.index.sampling),
-        _settings(Labels(tail=plan.tail, g=plan.g, metric=METRIC, weights=plan.weights), Sampling(seed=plan.seed)),
+        _settings(
+            Labels(tail=plan.options.tail, g=plan.options.g, metric=METRIC, weights=plan.options.weights),
+            Sampling(seed=plan.options.seed),
+        ),
         "Give the build its --tail, --g, --seed and --weights, or another data set with --replay.",
     )
     return Replay(dataset, entries)

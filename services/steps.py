@@ -5,15 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import PurePath
 
-from schemas.measurement import Certificate, Measurement, TrainingPoint
+from schemas.measurement import Certificate, Measurement
 from schemas.problem import ExitCode, Problem
 from schemas.skips import OPAQUE_SCENES, OPAQUE_VIEWS
-from schemas.view import View
 from services.plan import Plan, PlannedScene
 from services.records import Bundle, EvaluatedView, LabelledView, RenderedView, SceneEntry
 from services.scene_warnings import said_warnings
-from services.stages import tasks
-from services.tasks import Facts, Runner, Source, StageName, Task
+from services.stages.evaluate import EVALUATE
+from services.stages.export import EXPORT
+from services.stages.inputs import EvaluateFacts
+from services.stages.label import LABEL, LabelFacts
+from services.stages.render import RENDER
+from services.stages.scene import SCENE, SceneFacts
+from services.stages.stage import F, P, Stage
+from services.stages.train import TRAIN
+from services.tasks import Runner, Source, Task
 
 
 def read_scenes(plan: Plan, runner: Runner) -> tuple[SceneEntry, ...]:
@@ -22,13 +28,12 @@ def read_scenes(plan: Plan, runner: Runner) -> tuple[SceneEntry, ...]:
     Raises:
         Problem: A file is not a scene, two are the same, or nothing in them is transparent.
     """
-    asked = [tasks.scene_task(plan, scene) for scene in plan.scenes]
-    made = _map(runner, "scene", asked)
+    made = _made(runner, SCENE, [SCENE.ask(plan, scene) for scene in plan.scenes])
     entries = [_entry(scene, facts) for scene, facts in zip(plan.scenes, made, strict=True) if facts is not None]
     for entry in entries:
         source = entry.source
         file = None if source.folder is None else PurePath(source.folder, source.root)
-        for line in said_warnings(entry.label, entry.warnings, file):
+        for line in said_warnings(entry.label, entry.facts.warnings, file):
             runner.progress.note(line)
     _refuse_copies(entries)
     return _transparent(runner, entries)
@@ -36,28 +41,28 @@ def read_scenes(plan: Plan, runner: Runner) -> tuple[SceneEntry, ...]:
 
 def render_views(plan: Plan, runner: Runner, scenes: Sequence[SceneEntry]) -> tuple[RenderedView, ...]:
     """Dumps of all views that have a transparent fragment; the others are counted as skipped."""
-    views = [(scene, view) for scene in scenes for view in scene.views]
-    asked = [tasks.render_task(plan, scene, view) for scene, view in views]
+    views = [(scene, view) for scene in scenes for view in scene.facts.views]
+    asked = [RENDER.ask(plan, scene, view) for scene, view in views]
     rendered = []
-    for (scene, view), task, facts in zip(views, asked, _map(runner, "render", asked), strict=True):
+    for (scene, view), task, facts in zip(views, asked, _made(runner, RENDER, asked), strict=True):
         if facts is None:
             continue
-        if facts["total"] == 0:
+        if facts.total == 0:
             runner.progress.skipped(OPAQUE_VIEWS)
             continue
-        rendered.append(RenderedView(scene, view, task, facts["total"]))
+        rendered.append(RenderedView(scene, view, task, facts.total))
     _require_views(runner, scenes, rendered)
     return tuple(rendered)
 
 
 def label_views(plan: Plan, runner: Runner, views: Sequence[RenderedView]) -> tuple[LabelledView, ...]:
     """Labels of all views: all budgets of a view in one task. What took no part in them is counted as skipped."""
-    asked = [tasks.label_task(plan, view) for view in views]
+    asked = [LABEL.ask(plan, view) for view in views]
     labelled = []
-    for view, task, facts in zip(views, asked, _map(runner, "label", asked), strict=True):
+    for view, task, facts in zip(views, asked, _made(runner, LABEL, asked), strict=True):
         if facts is None:
             continue
-        for what, count in facts["skips"].items():
+        for what, count in facts.skips.items():
             if count:
                 runner.progress.skipped(what, count)
         labelled.append(LabelledView(view, task, facts, _certificates(plan, view, facts)))
@@ -87,14 +92,13 @@ def learn(
     Raises:
         Problem: There is nothing to learn from, or the exported forms do not agree.
     """
-    train = tasks.train_task(plan, shards, start)
-    (trained,) = _map(runner, "train", [train])
-    export = tasks.export_task(plan, train, scenes, held_out, licences)
-    (exported,) = _map(runner, "export", [export])
+    train = TRAIN.ask(plan, shards, start)
+    (trained,) = _made(runner, TRAIN, [train])
+    export = EXPORT.ask(plan, train, scenes, held_out, licences)
+    (exported,) = _made(runner, EXPORT, [export])
     assert trained is not None, "a stage of one task has it done, or raises"
     assert exported is not None, "a stage of one task has it done, or raises"
-    history = tuple(TrainingPoint.model_validate(point) for point in trained["history"])
-    return Bundle(export, train, exported["digest"], exported["files"], history)
+    return Bundle(plan.name, export, train, exported, trained.history)
 
 
 def evaluate_views(
@@ -109,11 +113,11 @@ def evaluate_views(
         bundle: The bundle.
         export: The task that exported it; None: it is published.
     """
-    baselines = [tasks.evaluate_task(plan, view, "baseline") for view in views]
-    bundles = [tasks.evaluate_task(plan, view, "bundle", bundle, export) for view in views]
+    baselines = [EVALUATE.ask(plan, view, "baseline") for view in views]
+    bundles = [EVALUATE.ask(plan, view, "bundle", bundle, export) for view in views]
     # Baseline and bundle of a view follow each other: they share the frame's opaque and gather passes.
     asked = [task for pair in zip(baselines, bundles, strict=True) for task in pair]
-    made = _map(runner, "evaluate", asked)
+    made = _made(runner, EVALUATE, asked)
     evaluated = []
     for index, view in enumerate(views):
         pair, facts = asked[2 * index : 2 * index + 2], made[2 * index : 2 * index + 2]
@@ -125,56 +129,47 @@ def evaluate_views(
 
 def measure_rival(plan: Plan, runner: Runner, views: Sequence[EvaluatedView], rival: Source) -> tuple[Measurement, ...]:
     """A published version on the views that a new one was measured on."""
-    asked = [tasks.evaluate_task(plan, view.labelled, "bundle", rival) for view in views]
-    made = _map(runner, "evaluate", asked)
+    asked = [EVALUATE.ask(plan, view.labelled, "bundle", rival) for view in views]
+    made = _made(runner, EVALUATE, asked)
     return tuple(m for view, facts in zip(views, made, strict=True) for m in _measurements(view.labelled, facts))
 
 
-def _map(runner: Runner, stage: StageName, asked: Sequence[Task]) -> list[Facts | None]:
-    """The runner's answer; nothing made at all is no answer.
+def _made(runner: Runner, stage: Stage[P, F], asked: Sequence[Task]) -> list[F | None]:
+    """The facts of each artifact, None for a task that failed; nothing made at all is no answer.
 
     Raises:
         Problem: Every task of the stage failed.
     """
-    made = runner.map(stage, asked)
+    made = runner.map(stage.name, asked)
     if asked and all(facts is None for facts in made):
         raise Problem(
-            f"The stage {stage} failed for {'each of its ' if len(asked) > 1 else 'its '}{len(asked)} "
+            f"The stage {stage.name} failed for {'each of its ' if len(asked) > 1 else 'its '}{len(asked)} "
             f"task{'s' if len(asked) > 1 else ''}.",
             "See the reasons in the tasks of the job; a retry continues with what was made.",
             ExitCode.CHECK_FAILED,
         )
-    return made
+    return [None if facts is None else stage.facts.model_validate(facts) for facts in made]
 
 
-def _measurements(view: LabelledView, facts: Facts | None) -> list[Measurement]:
-    records = [] if facts is None else facts["measurements"]
+def _measurements(view: LabelledView, facts: EvaluateFacts | None) -> list[Measurement]:
+    measured = () if facts is None else facts.measurements
     about = {"scene": view.scene.label, "camera": view.rendered.view}
-    return [Measurement.model_validate({**record, **about}) for record in records]
+    return [record.model_copy(update=about) for record in measured]
 
 
-def _entry(scene: PlannedScene, facts: Facts) -> SceneEntry:
-    return SceneEntry(
-        label=scene.label,
-        source=scene.source,
-        held_out=scene.held_out,
-        views=tuple(View.model_validate(view) for view in facts["views"]),
-        triangles=facts["triangles"],
-        opaque=facts["opaque"],
-        content=facts["content"],
-        warnings=tuple(facts["warnings"]),
-        licence=facts["licence"] if scene.licence is None else scene.licence,
-    )
+def _entry(scene: PlannedScene, facts: SceneFacts) -> SceneEntry:
+    licence = facts.licence if scene.licence is None else scene.licence
+    return SceneEntry(scene.label, scene.source, scene.held_out, facts, licence)
 
 
-def _certificates(plan: Plan, view: RenderedView, facts: Facts) -> tuple[Certificate, ...]:
+def _certificates(plan: Plan, view: RenderedView, facts: LabelFacts) -> tuple[Certificate, ...]:
     return tuple(
         Certificate(
             scene=view.scene.label,
             view=view.view.name,
             budget_factor=factor,
-            rules={rule: errors[index] for rule, errors in facts["errors"].items() if rule != "optimal"},
-            **facts["certificates"][index],
+            rules={rule: errors[index] for rule, errors in facts.errors.items() if rule != "optimal"},
+            **facts.certificates[index].model_dump(),
         )
         for index, factor in enumerate(plan.factors)
     )
@@ -185,7 +180,7 @@ def _refuse_copies(entries: Sequence[SceneEntry]) -> None:
     seen: dict[tuple[str, int], str] = {}
     for entry in entries:
         # The digest of a scene holds its file names; the root file and what comes of it do not depend on them.
-        content = entry.content, entry.triangles
+        content = entry.facts.content, entry.facts.triangles
         if content in seen:
             raise Problem(f"{seen[content]} and {entry.label} have the same content.", "Name each scene once.")
         seen[content] = entry.label
@@ -197,8 +192,8 @@ def _transparent(runner: Runner, entries: Sequence[SceneEntry]) -> tuple[SceneEn
     Raises:
         Problem: None is left, or none to train on.
     """
-    opaque = [entry for entry in entries if entry.opaque]
-    kept = [entry for entry in entries if not entry.opaque]
+    opaque = [entry for entry in entries if entry.facts.opaque]
+    kept = [entry for entry in entries if not entry.facts.opaque]
     if opaque:
         why = f"Nothing in {_names(opaque)} is transparent, so there is nothing to allocate."
         remedy = "Make every surface of all scenes transparent with --alpha 0.33, or name other scenes."

@@ -6,9 +6,8 @@ and small facts pass between them, everything else goes through the store.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Literal, Protocol, get_args
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
@@ -24,31 +23,7 @@ Role = Literal["jobs", "render", "label", "train"]
 ROLES: tuple[Role, ...] = ("jobs", "render", "label", "train")
 
 StageName = Literal["scene", "render", "label", "train", "export", "evaluate", "report"]
-
-STAGE_ROLE: Mapping[str, Role] = {
-    "scene": "render",
-    "render": "render",
-    "label": "label",
-    "train": "train",
-    "export": "train",
-    "evaluate": "render",
-    "report": "render",
-}
-"""Which kind of worker a stage needs: `render` has OpenGL and USD, `label` numba, `train` torch and OpenGL."""
-
-STAGE_NEEDS: Mapping[StageName, tuple[StageName, ...]] = {
-    "scene": (),
-    "render": ("scene",),
-    "label": ("render",),
-    "train": ("label",),
-    "export": ("train",),
-    "evaluate": ("label", "export"),
-    "report": ("evaluate",),
-}
-"""Stage -> the stages that come right before it, each stage after those that it needs.
-
-A task may only need artifacts of stages that come before its own, right before or further back.
-"""
+"""In an order in which each stage comes after those that it needs; a task needs artifacts of earlier ones only."""
 
 FACTS = "facts.json"
 """File of every artifact with what the pipeline has to know of it: small, JSON."""
@@ -82,7 +57,7 @@ class Task(BaseModel):
         stage: Stage of the address.
         version: Code version of the address.
         inputs: Inputs of the address.
-        params: Parameters of the address.
+        params: Parameters of the address, JSON of the stage's own (`services.stages.stage.Stage.params`).
         needs: Artifacts that are read, as `stage/key`.
         scene: The scene, where the stage reads it.
         bundle: The published bundle, where the stage renders one that is no artifact.
@@ -103,7 +78,8 @@ class Task(BaseModel):
 
     @model_validator(mode="after")
     def _needs_earlier_stages(self) -> Task:
-        later = {need.partition("/")[0] for need in self.needs} - _before(self.stage)
+        order: tuple[str, ...] = get_args(StageName)
+        later = {need.partition("/")[0] for need in self.needs} - set(order[: order.index(self.stage)])
         if later:
             raise ValueError(f"the stage {self.stage} does not come after {', '.join(sorted(later))}")
         return self
@@ -118,22 +94,12 @@ class Task(BaseModel):
         """`stage/key`, as in another task's `needs`."""
         return f"{self.stage}/{self.address.key}"
 
-    @property
-    def role(self) -> Role:
-        """Which kind of worker does it."""
-        return STAGE_ROLE[self.stage]
-
-
-@cache
-def _before(stage: StageName) -> frozenset[str]:
-    """All stages that come before one."""
-    return frozenset(STAGE_NEEDS[stage]).union(*map(_before, STAGE_NEEDS[stage]))
-
 
 Report = Callable[[float, str], None]
 """How a stage's body tells how far it is: the fraction done, and how it goes."""
 
-Facts = dict[str, Any]
+JsonFacts = dict[str, Any]
+"""Facts of an artifact as they lie in the store; `Stage.facts` is their type."""
 
 
 class Runner(Protocol):
@@ -157,7 +123,7 @@ class Runner(Protocol):
     job_id: str | None
     who: str | None
 
-    def map(self, stage: StageName, tasks: Sequence[Task]) -> list[Facts | None]:
+    def map(self, stage: StageName, tasks: Sequence[Task]) -> list[JsonFacts | None]:
         """Makes what is missing of a stage's artifacts.
 
         Returns:

@@ -15,9 +15,10 @@
 #   RETRAIN_REPLAY          false: do not train again on what that network was trained on (true)
 #   RETRAIN_PROMOTE         true: a better version becomes the champion, else it stays a candidate (false)
 #   RETRAIN_SUMMARY         file that the Markdown table for the pull request is written to
-#   RETRAIN_BUDGETS, RETRAIN_SIZE, RETRAIN_ALPHA, RETRAIN_VIEWS, RETRAIN_VIEWS_PER_SCENE, RETRAIN_SEED, RETRAIN_STEPS,
-#   RETRAIN_PATIENCE, RETRAIN_WEIGHTS, RETRAIN_PRIORITY, RETRAIN_LICENCE
+#   RETRAIN_VIEWS, RETRAIN_LICENCE
 #                           as the options of `diaphane retrain`; empty: its defaults
+#
+# `diaphane retrain` itself reads its options of a build in the same way; its help names the variables.
 #
 # Arguments of the script are passed on to `diaphane retrain` as well. Exit status: 0 passed, 1 worse or failed, others
 # as `diaphane` documents them.
@@ -39,10 +40,7 @@ set -- retrain "$@" --name="$RETRAIN_NAME"
 
 # An empty value is the same as none: that is what an input without a value looks like.
 for option in max-regression="${RETRAIN_MAX_REGRESSION:-}" baseline="${RETRAIN_BASELINE:-}" \
-    from="${RETRAIN_START_FROM:-}" summary="${RETRAIN_SUMMARY:-}" budgets="${RETRAIN_BUDGETS:-}" \
-    size="${RETRAIN_SIZE:-}" alpha="${RETRAIN_ALPHA:-}" views="${RETRAIN_VIEWS:-}" \
-    views-per-scene="${RETRAIN_VIEWS_PER_SCENE:-}" seed="${RETRAIN_SEED:-}" steps="${RETRAIN_STEPS:-}" \
-    patience="${RETRAIN_PATIENCE:-}" weights="${RETRAIN_WEIGHTS:-}" priority="${RETRAIN_PRIORITY:-}" \
+    from="${RETRAIN_START_FROM:-}" summary="${RETRAIN_SUMMARY:-}" views="${RETRAIN_VIEWS:-}" \
     licence="${RETRAIN_LICENCE:-}"; do
     [ -z "${option#*=}" ] || set -- "$@" "--$option"
 done

@@ -13,7 +13,8 @@ from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 from schemas.tail import TailName
 from schemas.work import Device
-from services.options import check_budget, check_bundle, check_steepness, parse_size, parse_tail
+from services.flags import parse_size
+from services.options import check_budget, check_bundle, check_steepness, parse_tail
 
 AUTHORED = "authored"
 """The word for the materials' own opacity."""
@@ -136,22 +137,6 @@ def parse_budgets(text: str) -> tuple[float, ...]:
         Problem: It has something else.
     """
     return tuple(sorted({_number(part, "--budgets", ".5,1,2") for part in _parts(text, "--budgets", ".5,1,2")}))
-
-
-def parse_device(bandwidth: float, fill_rate: float) -> Device:
-    """What bounds of frame times are stated for.
-
-    Args:
-        bandwidth: GB/s.
-        fill_rate: Gfragments/s.
-
-    Raises:
-        Problem: One of them is not above 0.
-    """
-    for option, value in (("--bandwidth", bandwidth), ("--fill-rate", fill_rate)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise Problem(f"{option} {value:g} cannot be used.", "Give a number above 0.")
-    return Device(bandwidth=bandwidth, fill_rate=fill_rate)
 
 
 def parse_alphas(text: str | None) -> tuple[float | None, ...]:

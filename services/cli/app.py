@@ -41,6 +41,7 @@ from services.cli import (
     worker,
     workers,
 )
+from services.cli.model_options import add_command
 from services.cli.state import DEFAULT_STATE, STATE_VARIABLE
 
 app = typer.Typer(
@@ -50,17 +51,17 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-app.command("build")(build.build)
+add_command(app, "build", build.build, "schemas.options:Options")
 app.command("render")(render.render)
 app.command("view")(view.view)
 app.command("dump")(dump.dump)
-app.command("bench")(bench.bench)
+add_command(app, "bench", bench.bench, "schemas.work:Device")
 app.add_typer(scene.app, name="scene")
 app.command("samples")(samples.samples)
 app.command("stress")(stress.stress)
 app.command("serve")(serve.serve)
 app.command("worker")(worker.worker)
-app.command("retrain")(retrain.retrain)
+add_command(app, "retrain", retrain.retrain, "schemas.job:JobSpec", without=retrain.OWN, variables=retrain.VARIABLES)
 app.add_typer(scenes.app, name="scenes")
 app.add_typer(jobs.app, name="jobs")
 app.add_typer(dataset.app, name="dataset")

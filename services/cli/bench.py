@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -91,19 +91,18 @@ def bench(
             "--account/--no-account", help="Count the work of a frame of each cell: passes, fragments, bytes, atomics."
         ),
     ] = True,
-    bandwidth: Annotated[float, typer.Option("--bandwidth", help="GB/s that bounds of frame times suppose.")] = 500.0,
-    fill_rate: Annotated[
-        float, typer.Option("--fill-rate", help="Gfragments/s that bounds of frame times suppose.")
-    ] = 50.0,
     resume: Annotated[
         bool, typer.Option("--resume/--fresh", help="Keep what was measured into --out already, or measure all anew.")
     ] = True,
     state: StateOption = DEFAULT_STATE,
     as_json: JsonOption = False,
+    **given: Any,
 ) -> None:
     """Measure every technique: time of each pass, bytes, errors, scores at equal fragments and memory, work counted."""
+    from schemas.work import Device
+    from services import flags
     from services.bench.groups import group, groups_of
-    from services.bench.options import BenchOptions, parse_alphas, parse_budgets, parse_device, parse_sizes, parse_tails
+    from services.bench.options import BenchOptions, parse_alphas, parse_budgets, parse_sizes, parse_tails
     from services.options import parse_glass
     from services.progress import make_progress
     from services.render_options import parse_needs, parse_refine, parse_techniques, said_left_out
@@ -129,7 +128,7 @@ def bench(
         path=path,
         repeats=repeats,
         account=account,
-        device=parse_device(bandwidth, fill_rate),
+        device=flags.checked(Device, flags.given(Device, given)),
         limit=limit,
         resume=resume,
         state=state,

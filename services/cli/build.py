@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from schemas.glass import DEFAULT_GLASS
-from schemas.network import DEFAULT_NETWORK
-from schemas.pixel_weights import DEFAULT_WEIGHTS, WEIGHTS_HELP
-from schemas.tail import BUNDLE_TAIL_HELP, DEFAULT_TAIL, DENSITY_G
 from services.cli import output
-from services.cli.scene_options import GlassOption, LicenceOption
+from services.cli.scene_options import LicenceOption
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
-from services.cli.technique_options import BudgetsOption
 
 if TYPE_CHECKING:
     from services.options import BuildOptions
@@ -25,72 +20,46 @@ if TYPE_CHECKING:
 def build(
     scenes: Annotated[list[Path], typer.Argument(help="USD files: .usd, .usda, .usdc, .usdz.")],
     name: Annotated[str, typer.Option("--name", help="Name of the bundle in the registry.")],
-    budgets: BudgetsOption = None,
-    alpha: Annotated[float | None, typer.Option("--alpha", help="Opacity that every surface gets, in (0, 1).")] = None,
-    glass: GlassOption = DEFAULT_GLASS,
     holdout: Annotated[
         list[Path] | None,
-        typer.Option("--holdout", help="Scene to evaluate on and never train on; repeatable. Default: a quarter."),
+        typer.Option(
+            "--holdout",
+            help="Scene to evaluate on and never train on, by path or stem; repeatable. Default: a quarter.",
+        ),
     ] = None,
     licence: LicenceOption = None,
-    views: Annotated[Path | None, typer.Option("--views", help="JSON file with the views of the scenes.")] = None,
-    views_per_scene: Annotated[
-        int, typer.Option("--views-per-scene", help="Views sampled of a scene that has no cameras.")
-    ] = 3,
-    size: Annotated[str, typer.Option("--size", help="Width and height of the pictures, pixels.")] = "1430x960",
-    tail: Annotated[str, typer.Option("--tail", help=BUNDLE_TAIL_HELP)] = DEFAULT_TAIL,
-    g: Annotated[float, typer.Option("--g", help="Steepness of the density tail.")] = DENSITY_G,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of everything drawn at random.")] = 0,
-    steps: Annotated[int | None, typer.Option("--steps", help="Optimiser steps. Default: the trainer's.")] = None,
-    network: Annotated[
-        str, typer.Option("--network", help="Size: tiny, small or full; --from keeps its own.")
-    ] = DEFAULT_NETWORK,
-    patience: Annotated[
-        int, typer.Option("--patience", help="Stop after so many validations without a better score; 0: never.")
-    ] = 0,
-    weights: Annotated[str, typer.Option("--weights", help=WEIGHTS_HELP)] = DEFAULT_WEIGHTS,
+    views: Annotated[
+        Path | None,
+        typer.Option("--views", help="JSON file with the views of the scenes. Default: the stages' cameras."),
+    ] = None,
     start: Annotated[
-        str | None, typer.Option("--from", help="Bundle to begin with: a folder, or NAME@ALIAS of the registry.")
+        str | None,
+        typer.Option("--from", help="Bundle to begin with: a folder, or NAME@ALIAS of the registry. Default: none."),
     ] = None,
     replay: Annotated[
-        Path | None, typer.Option("--replay", help="Data set that --from must not forget. Default: that of its name.")
+        Path | None,
+        typer.Option(
+            "--replay",
+            help="Data set that --from must not forget, so that it is trained on again. Default: that of its name.",
+        ),
     ] = None,
     state: StateOption = DEFAULT_STATE,
     as_json: JsonOption = False,
+    **given: Any,
 ) -> None:
     """Render, label, train, evaluate, publish and report. The same command again continues, or finds it all done."""
-    from services.options import (
-        BuildOptions,
-        parse_budgets,
-        parse_glass,
-        parse_licences,
-        parse_network,
-        parse_size,
-        parse_tail,
-        parse_weights,
-    )
+    from schemas.options import Options
+    from services import flags
+    from services.options import BuildOptions, asked, parse_licences
     from services.progress import make_progress
 
-    width, height = parse_size(size)
     options = BuildOptions(
         scenes=tuple(scenes),
         name=name,
-        budgets=None if budgets is None else parse_budgets(budgets),
+        options=asked(Options, flags.given(Options, given)),
         holdout=tuple(holdout or ()),
         licences={Path(scene): said for scene, said in parse_licences(licence or (), [*map(str, scenes)]).items()},
-        alpha=alpha,
-        glass=parse_glass(glass),
         views=views,
-        views_per_scene=views_per_scene,
-        width=width,
-        height=height,
-        tail=parse_tail(tail),
-        g=g,
-        seed=seed,
-        steps=steps,
-        network=parse_network(network),
-        patience=patience,
-        weights=parse_weights(weights),
         start=start,
         replay=replay,
         state=state,
@@ -138,4 +107,4 @@ def _show(options: BuildOptions, result: BuildResult) -> None:
     console.print(f"Bundle: {result.registry.folder}", markup=False)
     console.print(f"Data set: {result.dataset}", markup=False)
     console.print(f"Report: {result.report}", markup=False)
-    console.print(f"[dim]{result.seconds:.1f} s, seed {options.seed}[/]")
+    console.print(f"[dim]{result.seconds:.1f} s, seed {options.options.seed}[/]")

@@ -52,7 +52,8 @@ def dump(
     from renderer.scene import LoadOptions
     from services.dumping import DumpOptions
     from services.dumping import dump as run
-    from services.options import parse_glass, parse_size
+    from services.flags import parse_size
+    from services.options import parse_glass
     from services.render_options import parse_background, parse_refine
     from services.scene_warnings import said_warnings
 

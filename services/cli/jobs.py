@@ -9,12 +9,13 @@ import typer
 from services.cli import output
 from services.cli.job_text import show_job
 from services.cli.lines import percent, plain, print_columns, seconds
+from services.cli.model_options import add_command
 from services.cli.server import DEFAULT_URL, KeyFileOption, LimitOption, UrlOption, connect
 from services.cli.state import JsonOption
 from services.cli.submit import submit
 
 app = typer.Typer(help="Jobs on a server: submit, watch, cancel, retry.", no_args_is_help=True)
-app.command("submit")(submit)
+add_command(app, "submit", submit, "schemas.job:JobSpec", without=("kind",))
 
 JobArgument = Annotated[str, typer.Argument(metavar="ID", help="Id of the job.")]
 StateFilter = Annotated[str | None, typer.Option("--state", help="Only those in this state.")]

@@ -92,7 +92,8 @@ def render(
 ) -> None:
     """Render pictures by any technique within a budget, and say what each cost."""
     from renderer.scene import LoadOptions
-    from services.options import parse_glass, parse_size, parse_tail
+    from services.flags import parse_size
+    from services.options import parse_glass, parse_tail
     from services.progress import make_progress
     from services.render_options import (
         RenderOptions,

@@ -17,31 +17,17 @@ from services.cli import output
 from services.cli.scene_options import LicenceOption
 from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption, connect
 from services.cli.state import JsonOption
-from services.cli.submit import (
-    AlphaOption,
-    GlassOption,
-    NetworkOption,
-    NoReplayOption,
-    PatienceOption,
-    PriorityOption,
-    SeedOption,
-    SizeOption,
-    SteepnessOption,
-    StepsOption,
-    TailOption,
-    ViewsOption,
-    ViewsPerSceneOption,
-    WeightsOption,
-    job_fields,
-    job_spec,
-)
-from services.cli.technique_options import BudgetsOption
+from services.cli.submit import ViewsOption, job_fields, job_spec
 
 if TYPE_CHECKING:
     from services.cli.comparison import Comparison
     from services.cli.remote import Remote
 
 CHAMPION, SCRATCH = "champion", "scratch"
+OWN = ("name", "dataset", "model", "start_from", "promote")
+"""Fields of a job that are decided here."""
+VARIABLES = "RETRAIN_"
+"""What the names of the variables begin with that `deploy/retrain` gives options by."""
 _SHOWN_TASKS = 5
 
 
@@ -59,52 +45,24 @@ def retrain(
         str,
         typer.Option("--from", "--start-from", help="champion (the name's own), scratch, or NAME@ALIAS to begin with."),
     ] = CHAMPION,
-    is_forgotten: NoReplayOption = False,
-    patience: PatienceOption = None,
-    weights: WeightsOption = None,
     is_promoted: Annotated[bool, typer.Option("--promote", help="Make it the champion if it is better.")] = False,
     summary: Annotated[Path | None, typer.Option("--summary", help="File that the Markdown table goes to.")] = None,
     licence: LicenceOption = None,
-    budgets: BudgetsOption = None,
-    alpha: AlphaOption = None,
-    glass: GlassOption = None,
     views: ViewsOption = None,
-    views_per_scene: ViewsPerSceneOption = None,
-    size: SizeOption = None,
-    tail: TailOption = None,
-    g: SteepnessOption = None,
-    seed: SeedOption = None,
-    network: NetworkOption = None,
-    steps: StepsOption = None,
-    priority: PriorityOption = None,
     url: UrlOption = DEFAULT_URL,
     key_file: KeyFileOption = None,
     as_json: JsonOption = False,
+    **given: Any,
 ) -> None:
     """Build from changed scenes, compare with the champion on the held-out ones, and fail if that is worse.
 
     The same scenes again find the same job. The new version stays a candidate unless --promote is given.
     """
     _check(max_regression, baseline)
-    fields = job_fields(
-        budgets=budgets,
-        alpha=alpha,
-        glass=glass,
-        views_per_scene=views_per_scene,
-        size=size,
-        tail=tail,
-        g=g,
-        seed=seed,
-        network=network,
-        steps=steps,
-        patience=patience,
-        weights=weights,
-        priority=priority,
-    )
+    fields = job_fields(given)
     remote = connect(url, key_file)
     champion = _champion(remote, name)
-    fields |= {"kind": "build", "name": name, "promote": "never"}
-    fields |= {"start_from": _start(remote, start, champion), "replay": not is_forgotten}
+    fields |= {"kind": "build", "name": name, "promote": "never", "start_from": _start(remote, start, champion)}
     spec = _with_scenes(remote, fields, (scenes, holdout, licence or []), views, silent=as_json)
     job, rival = _finished(remote, spec, champion, silent=as_json)
     comparison = _compare(remote, job, spec, rival if baseline == CHAMPION else None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -10,39 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from schemas.glass import GLASS_HELP
-from schemas.pixel_weights import WEIGHTS_HELP
-from schemas.problem import Problem
-from schemas.tail import TAIL_HELP
 from services.cli import output
 from services.cli.scene_options import LicenceOption
 from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption, connect
 from services.cli.state import JsonOption
-from services.cli.technique_options import BudgetsOption
 
 if TYPE_CHECKING:
     from services.cli.inputs import SceneInput
 
-AlphaOption = Annotated[float | None, typer.Option("--alpha", help="Opacity that every surface gets, in (0, 1).")]
 ViewsOption = Annotated[Path | None, typer.Option("--views", help="JSON file with the views of local scenes.")]
-GlassOption = Annotated[str | None, typer.Option("--glass", help=GLASS_HELP)]
-ViewsPerSceneOption = Annotated[
-    int | None, typer.Option("--views-per-scene", help="Views sampled of a scene that has no cameras.")
-]
-SizeOption = Annotated[str | None, typer.Option("--size", help="Width and height of the pictures, pixels: 1430x960.")]
-TailOption = Annotated[str | None, typer.Option("--tail", help=TAIL_HELP)]
-SteepnessOption = Annotated[float | None, typer.Option("--g", help="Steepness of the density tail.")]
-SeedOption = Annotated[int | None, typer.Option("--seed", help="Seed of everything drawn at random.")]
-NetworkOption = Annotated[str | None, typer.Option("--network", help="Size of the network: tiny, small or full.")]
-StepsOption = Annotated[int | None, typer.Option("--steps", help="Optimiser steps.")]
-NoReplayOption = Annotated[
-    bool, typer.Option("--no-replay", help="Do not train again on what --from was trained on: it may be forgotten.")
-]
-PatienceOption = Annotated[
-    int | None, typer.Option("--patience", help="Stop after so many validations without a better score; 0: never.")
-]
-WeightsOption = Annotated[str | None, typer.Option("--weights", help=WEIGHTS_HELP)]
-PriorityOption = Annotated[str | None, typer.Option("--priority", help="low, normal or high.")]
 
 
 def submit(
@@ -54,30 +29,8 @@ def submit(
         list[str] | None,
         typer.Option("--holdout", help="Scene to evaluate on and never train on; repeatable. Default: a quarter."),
     ] = None,
-    name: Annotated[str | None, typer.Option("--name", help="Name of the bundle in the registry.")] = None,
-    dataset: Annotated[str | None, typer.Option("--dataset", help="Data set that a train learns from.")] = None,
-    model: Annotated[str | None, typer.Option("--model", help="Version that an evaluate measures.")] = None,
     licence: LicenceOption = None,
-    budgets: BudgetsOption = None,
-    alpha: AlphaOption = None,
-    glass: GlassOption = None,
     views: ViewsOption = None,
-    views_per_scene: ViewsPerSceneOption = None,
-    size: SizeOption = None,
-    tail: TailOption = None,
-    g: SteepnessOption = None,
-    seed: SeedOption = None,
-    network: NetworkOption = None,
-    steps: StepsOption = None,
-    start: Annotated[
-        str | None,
-        typer.Option("--from", "--start-from", help="scratch, champion (the name's own), or NAME@ALIAS to begin with."),
-    ] = None,
-    is_forgotten: NoReplayOption = False,
-    patience: PatienceOption = None,
-    weights: WeightsOption = None,
-    promote: Annotated[str | None, typer.Option("--promote", help="if-better or never.")] = None,
-    priority: PriorityOption = None,
     idempotency_key: Annotated[
         str | None, typer.Option("--idempotency-key", help="The same key with the same job finds that job.")
     ] = None,
@@ -85,30 +38,14 @@ def submit(
     url: UrlOption = DEFAULT_URL,
     key_file: KeyFileOption = None,
     as_json: JsonOption = False,
+    **given: Any,
 ) -> None:
     """Submit a job; local scenes are uploaded as far as the server lacks them."""
     from services.cli.inputs import bring, named_scenes, scene_uses, with_licences
     from services.cli.job_text import show_job
     from services.cli.watching import ensure_success, follow
 
-    fields = job_fields(
-        budgets=budgets,
-        alpha=alpha,
-        glass=glass,
-        views_per_scene=views_per_scene,
-        size=size,
-        tail=tail,
-        g=g,
-        seed=seed,
-        network=network,
-        steps=steps,
-        patience=patience,
-        weights=weights,
-        priority=priority,
-    )
-    named = {"name": name, "dataset": dataset, "model": model, "start_from": start, "promote": promote}
-    fields |= {"replay": False} if is_forgotten else {}
-    fields |= {field: value for field, value in named.items() if value is not None}
+    fields = job_fields(given)
     inputs = with_licences(named_scenes(scene or (), holdout or ()), licence or ())
     # Everything but the scenes' ids is checked before anything is uploaded.
     job_spec({**fields, "kind": kind, "scenes": [_stand_in(i, entry) for i, entry in enumerate(inputs)]})
@@ -127,37 +64,16 @@ def submit(
     ensure_success(job)
 
 
-def job_fields(
-    *,
-    budgets: str | None,
-    size: str | None,
-    tail: str | None,
-    network: str | None,
-    weights: str | None,
-    glass: str | None,
-    **plain_fields: Any,
-) -> dict[str, Any]:
-    """Fields of a job from options; what was not given is left to the server's defaults.
+def job_fields(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Fields of a job from options; what was not given is left out.
 
     Raises:
         Problem: An option cannot be read.
     """
-    from services.options import parse_budgets, parse_glass, parse_network, parse_size, parse_tail, parse_weights
+    from schemas.job import JobSpec
+    from services import flags
 
-    fields = {name: value for name, value in plain_fields.items() if value is not None}
-    if budgets is not None:
-        fields["budgets"] = sorted(set(parse_budgets(budgets)))
-    if size is not None:
-        fields["width"], fields["height"] = parse_size(size)
-    if tail is not None:
-        fields["tail"] = parse_tail(tail)
-    if network is not None:
-        fields["network"] = parse_network(network)
-    if glass is not None:
-        fields["glass"] = parse_glass(glass)
-    if weights is not None:
-        fields["weights"] = parse_weights(weights)
-    return fields
+    return flags.given(JobSpec, given)
 
 
 def job_spec(fields: Mapping[str, Any]) -> dict[str, Any]:
@@ -166,24 +82,13 @@ def job_spec(fields: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         Problem: It is not one.
     """
-    from pydantic import ValidationError
-
     from schemas.job import JobSpec
+    from services.options import asked
 
-    try:
-        spec = JobSpec.model_validate_json(json.dumps(fields))
-    except ValidationError as error:
-        faults = [_fault(detail) for detail in error.errors(include_url=False, include_input=False)]
-        raise Problem(f"This is no job: {'; '.join(faults)}.", "Change those options.") from None
+    spec = asked(JobSpec, fields)
     # What is not said of a promotion is decided by what the key may do.
     unsaid = {"promote"} - spec.model_fields_set
     return spec.model_dump(mode="json", exclude=unsaid)
-
-
-def _fault(detail: Any) -> str:
-    where = ".".join(str(part) for part in detail["loc"])
-    what = str(detail["msg"]).removeprefix("Value error, ")
-    return f"{where}: {what}" if where else what
 
 
 def _stand_in(number: int, entry: SceneInput) -> dict[str, Any]:

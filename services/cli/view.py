@@ -103,7 +103,8 @@ def view(
 ) -> None:
     """Look at a scene with two techniques: pictures, differences, k, times, bytes and errors. H lists the keys."""
     from renderer.scene import LoadOptions
-    from services.options import check_bundle, parse_glass, parse_size, parse_tail
+    from services.flags import parse_size
+    from services.options import check_bundle, parse_glass, parse_tail
     from services.progress import make_progress
     from services.render_options import (
         RenderOptions,

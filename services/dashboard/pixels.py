@@ -20,9 +20,9 @@ from schemas.tail import MetricName, TailName
 from services.dashboard.sides import Side
 from services.kept import Kept
 from services.report import charts
+from services.stages.evaluate import evaluated_from
 from services.stages.inputs import METRIC
 from services.stages.pictures import read_png
-from services.stages.tasks import evaluated_from
 from services.store import Address, MissingArtifact, Store
 
 if TYPE_CHECKING:

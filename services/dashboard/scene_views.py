@@ -14,8 +14,8 @@ from schemas.measurement import Certificate, Measurement
 from services import summary
 from services.database import Database
 from services.database.tables import measurements as table
+from services.stages.evaluate import evaluated_from
 from services.stages.pictures import stem
-from services.stages.tasks import evaluated_from
 from services.store import MissingArtifact, Store, canonical_json
 from services.tasks import FACTS
 

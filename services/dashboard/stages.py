@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from schemas.job import FINAL_STATES
 from schemas.service import JobRecord, StageProgress
-from services.engine.progress import SHARES
-from services.tasks import STAGE_NEEDS
+from services.engine.progress import STAGES_OF, WITHOUT_SCENES
+from services.stages.catalogue import STAGES
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,13 +31,12 @@ class Node:
 def graph(job: JobRecord) -> list[Node]:
     """All stages of a job, each after those that it needs."""
     known = {progress.stage: progress for progress in job.stages}
-    order = [stage for stage in STAGE_NEEDS if stage in SHARES[job.kind] or stage in known]
-    if job.spec.dataset is not None:
-        order = [stage for stage in order if stage in ("train", "export") or stage in known]
+    own = STAGES_OF[job.kind] if job.spec.dataset is None else WITHOUT_SCENES
+    order = [stage for stage in STAGES if stage in own or stage in known]
     return [
         Node(
             stage,
-            tuple(needed for needed in STAGE_NEEDS[stage] if needed in order),
+            tuple(needed for needed in STAGES[stage].after if needed in order),
             known.get(stage, StageProgress(stage=stage)),
             _state(known.get(stage), job.state),
         )

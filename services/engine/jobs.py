@@ -14,9 +14,7 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
-from schemas.glass import DEFAULT_GLASS
 from schemas.job import FINAL_STATES, JobKind, JobSpec, JobState, TaskState
-from schemas.pixel_weights import DEFAULT_WEIGHTS
 from schemas.problem import ExitCode, Problem
 from schemas.service import EventRecord, ExecutorRecord, JobRecord, QueueRecord, TaskRecord
 from services.acceptance import Accepted
@@ -371,15 +369,9 @@ class Jobs:
 _SELECT = sa.select(tables.jobs)
 
 
-_LATER_FIELDS = {"replay": True, "patience": 0, "weights": DEFAULT_WEIGHTS, "glass": DEFAULT_GLASS}
-"""Fields that specs did not have from the beginning, with their defaults: a request from before is still the same."""
-
-
 def _digest(spec: JobSpec) -> str:
-    """What tells whether two requests are the same."""
-    told = spec.model_dump(mode="json")
-    old = {name: value for name, value in told.items() if name not in _LATER_FIELDS or value != _LATER_FIELDS[name]}
-    return hashlib.sha256(canonical_json(old).encode()).hexdigest()
+    """What tells whether two requests are the same: one from before a field was added still is, by its default."""
+    return hashlib.sha256(canonical_json(spec.model_dump(mode="json", exclude_defaults=True)).encode()).hexdigest()
 
 
 def _of_key(connection: sa.Connection, submitted_by: str, key: str | None) -> sa.Row[Any] | None:

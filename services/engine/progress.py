@@ -13,16 +13,19 @@ import sqlalchemy as sa
 from schemas.job import JobKind
 from schemas.service import StageProgress
 from services.database import tables
-from services.tasks import STAGE_ROLE
+from services.stages.catalogue import STAGES
+from services.tasks import StageName
 
-SHARES: Mapping[JobKind, Mapping[str, float]] = {
-    "render": {"scene": 1.0, "render": 9.0},
-    "label": {"scene": 1.0, "render": 6.0, "label": 6.0},
-    "train": {"scene": 1.0, "render": 6.0, "label": 6.0, "train": 20.0, "export": 2.0},
-    "evaluate": {"scene": 1.0, "render": 6.0, "label": 6.0, "evaluate": 10.0},
-    "build": {"scene": 1.0, "render": 6.0, "label": 6.0, "train": 20.0, "export": 2.0, "evaluate": 10.0, "report": 1.0},
+STAGES_OF: Mapping[JobKind, tuple[StageName, ...]] = {
+    "render": ("scene", "render"),
+    "label": ("scene", "render", "label"),
+    "train": ("scene", "render", "label", "train", "export"),
+    "evaluate": ("scene", "render", "label", "evaluate"),
+    "build": tuple(STAGES),
 }
-"""Rough parts of the whole of each kind of job, for one number over stages whose tasks are not known yet."""
+"""The stages of each kind of job, in order."""
+WITHOUT_SCENES: tuple[StageName, ...] = ("train", "export")
+"""Those of a job that trains on a data set."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,18 +77,21 @@ def _whole(
     job: sa.Row[Any], groups: Mapping[str, Mapping[str, sa.Row[Any]]], slots: Mapping[str, int], now: float
 ) -> Whole:
     order = sorted(groups, key=lambda name: min(group.first for group in groups[name].values()))
-    stages = tuple(_stage(name, groups[name], slots.get(STAGE_ROLE.get(name, ""), 0), now) for name in order)
+    stages = tuple(_stage(name, groups[name], slots.get(_role(name), 0), now) for name in order)
     if job.state == "succeeded":
         return Whole(stages, 1.0, None)
-    shares = dict(SHARES[job.kind])
     known = {stage.stage: stage.fraction for stage in stages}
-    if job.spec.get("dataset") is not None:
-        shares = {name: share for name, share in shares.items() if name in ("train", "export")}
+    names = STAGES_OF[job.kind] if job.spec.get("dataset") is None else WITHOUT_SCENES
+    shares = {name: STAGES[name].share for name in names}
     whole = sum(shares.values())
     fraction = sum(share * known.get(name, 0.0) for name, share in shares.items()) / whole
     if job.state != "running":
         return Whole(stages, round(fraction, 4), None)
     return Whole(stages, round(min(fraction, 0.999), 4), _eta(job, stages, fraction, now))
+
+
+def _role(name: str) -> str:
+    return next((stage.role for stage in STAGES.values() if stage.name == name), "")
 
 
 def _stage(name: str, groups: Mapping[str, sa.Row[Any]], slots: int, now: float) -> StageProgress:

@@ -22,8 +22,9 @@ from services.engine.claims import Claims
 from services.engine.states import Abandoned, Claim
 from services.engine.tasks import Tasks
 from services.progress import Stage
+from services.stages.catalogue import STAGES
 from services.store import MissingArtifact, StoreAway
-from services.tasks import FACTS, Facts, StageName, Task
+from services.tasks import FACTS, JsonFacts, StageName, Task
 
 if TYPE_CHECKING:
     from services.measured import Measured
@@ -109,14 +110,14 @@ class DurableRunner:
         self._claim, self._id, self._attempt = claim, job_id, attempt
         self._database, self._tasks, self._claims = database, tasks, claims
 
-    def map(self, stage: StageName, tasks: Sequence[Task]) -> list[Facts | None]:
+    def map(self, stage: StageName, tasks: Sequence[Task]) -> list[JsonFacts | None]:
         """See `services.tasks.Runner`."""
         if not tasks:
             return []
         told: dict[str, Any] = {"stage": stage, "attempt": self._attempt}
         begun = {**told, "what": "begun", "tasks": len(tasks)}
         self._once(f"begin {stage}", lambda: states.note(self._database, self._id, ("stage", begun), stage=stage))
-        facts: dict[str, Facts | None] = {}
+        facts: dict[str, JsonFacts | None] = {}
         for _ in range(REMAKE_TRIES):
             self._place(tasks)
             self._join(stage)
@@ -213,10 +214,10 @@ class DurableRunner:
                 raise Abandoned(self._claim.workflow_id)
             wait = min(LONGEST_WAIT_SECONDS, 1.3 * wait)
 
-    def _read(self, stage: StageName, tasks: Sequence[Task]) -> tuple[dict[str, Facts | None], list[str]]:
+    def _read(self, stage: StageName, tasks: Sequence[Task]) -> tuple[dict[str, JsonFacts | None], list[str]]:
         """Facts by name of task, and artifacts that were there and are gone."""
         ends = self._tasks.states(self._id, stage)
-        facts: dict[str, Facts | None] = {}
+        facts: dict[str, JsonFacts | None] = {}
         missing: list[str] = []
         for task in tasks:
             facts[task.name] = None
@@ -229,12 +230,10 @@ class DurableRunner:
         return facts, missing
 
     def _count_skips(self, stage: StageName, tasks: Sequence[Task]) -> None:
-        from services.inline import skipped_title
-
         ends = self._tasks.states(self._id, stage)
         for task in tasks:
             if ends[task.name] == "skipped":
-                self.progress.skipped(skipped_title(task))
+                self.progress.skipped(STAGES[stage].known(task))
 
 
 def _outcome(body: Callable[[], Any]) -> dict[str, Any]:

@@ -25,6 +25,7 @@ from services.database import Database, tables
 from services.engine import events, problems, queues, system
 from services.engine.states import PATIENCE_SECONDS, Abandoned, Cancelled, Claim, lock_job, prefix_of, read
 from services.problems import document_of
+from services.stages.catalogue import STAGES
 from services.tasks import Task
 
 if TYPE_CHECKING:
@@ -413,23 +414,24 @@ class Tasks:
     ) -> None:
         prefix, numbers = prefix_of(job.id, job.attempt), dict[str, int]()
         for position, task in queued:
+            role = STAGES[task.stage].role
             kept = (
                 system.first_priority(connection, self._database, f"{prefix}{position}/") if tried[position] else None
             )
-            if kept is None and task.role not in numbers:
-                numbers[task.role] = queues.next_priority(connection, self._database, task.role, job.priority, prefix)
+            if kept is None and role not in numbers:
+                numbers[role] = queues.next_priority(connection, self._database, role, job.priority, prefix)
             system.enqueue(
                 self._client,
                 connection,
                 "task",
                 f"{prefix}{position}/{tried[position]}",
-                task.role,
+                role,
                 *(job.id, job.attempt, position, errors),
-                priority=numbers[task.role] if kept is None else kept,
+                priority=numbers[role] if kept is None else kept,
                 delay=delay,
             )
             if kept is None:
-                numbers[task.role] += 1
+                numbers[role] += 1
 
     def _back(self, connection: sa.Connection, row: sa.Row[Any]) -> None:
         values = {"state": "queued", "executor": None, "progress": None, "finished": None, "problem": None}

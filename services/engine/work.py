@@ -26,6 +26,7 @@ from services.engine.tasks import Begun, Place, Tasks
 from services.problems import document_of, summary_of
 from services.settings import Settings
 from services.sources import materialise
+from services.stages.catalogue import STAGES
 from services.store import MissingArtifact
 from services.tasks import Role, Task
 
@@ -198,7 +199,7 @@ class Worker:
         seconds = self._settings.train_seconds if task.stage == "train" else self._settings.task_seconds
         request = {"task": task.model_dump(mode="json")}
         hooks = Hooks(reporter.progress, reporter.line, reporter.tick)
-        with self._pools[task.role].child() as child:
+        with self._pools[STAGES[task.stage].role].child() as child:
             self._claims.on_loss(claim.workflow_id, child.lose)
             try:
                 answer = child.call(title, request, seconds, hooks, assignment)

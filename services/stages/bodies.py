@@ -1,4 +1,4 @@
-"""From a task to its artifact: the one place that knows which module does which stage."""
+"""From a task to its artifact."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from importlib import import_module
 from pathlib import Path
 
 from schemas.problem import ExitCode, Problem
-from services.stages.desk import Desk, FolderOf
-from services.stages.tasks import MODULES, version_of
+from services.stages.catalogue import STAGES
+from services.stages.desk import Desk, FolderOf, save_facts
+from services.stages.stage import module_of
 from services.store import Store
 from services.tasks import Report, Task
 
@@ -43,12 +44,13 @@ def make_at(desk: Desk, task: Task, report: Report) -> None:
     """
     if desk.store.get(task.address) is not None:
         return
-    if task.version != version_of(task.stage):
+    stage = STAGES[task.stage]
+    if task.version != stage.version:
         raise Problem(
             f"The task {task.stage} {task.name} is for another version of Diaphane than this process runs.",
             "Run the same version on all workers; a retry of the job then continues.",
             ExitCode.TRY_AGAIN,
         )
-    module = import_module(MODULES[task.stage])
+    made = import_module(module_of(task.stage))
     with desk.store.put(task.address) as folder:
-        module.make(desk, task, folder, report)
+        save_facts(folder, made.make(desk, task, stage.params_of(task), folder, report))

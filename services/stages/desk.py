@@ -5,16 +5,21 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, TypeVar
 
 from schemas.problem import ExitCode, Problem
+from services.stages.loading import Loading
+from services.stages.pictured import Pictured
+from services.stages.stage import Facts
 from services.store import Store
-from services.tasks import FACTS, Facts, Source, Task
+from services.tasks import FACTS, Source, Task
 
 if TYPE_CHECKING:
     from renderer.frame import Frame
     from renderer.gpu_scene import GpuScene
     from schemas.scene import SceneArrays
+
+F = TypeVar("F", bound=Facts)
 
 BUNDLE = "bundle"
 """Folder of the bundle in an `export` artifact."""
@@ -76,16 +81,21 @@ class Desk:
         folder.mkdir(parents=True, exist_ok=True)
         return folder / f"{task.address.key}.safetensors"
 
-    def scene(self, task: Task) -> SceneArrays:
-        """The scene's triangles; only the last one asked for is kept in memory."""
+    def scene(self, task: Task, loading: Loading) -> SceneArrays:
+        """The scene's triangles; only the last one asked for is kept in memory.
+
+        Args:
+            task: Names the scene.
+            loading: How its surfaces are loaded.
+        """
         from renderer.scene import LoadOptions, load_scene
 
-        alpha, glass = task.params["alpha"], task.params["glass"]
-        wanted = _present(task.scene, task).digest, alpha, glass
+        wanted = _present(task.scene, task).digest, loading.alpha, loading.glass
         if self._scene is None or self._loaded != wanted:
             self._gpu, self._scene = None, None
             path = self.scene_path(task)
-            self._scene = load_scene(path, LoadOptions(alpha=alpha, glass=glass, home=self._home(task, path)))
+            options = LoadOptions(alpha=loading.alpha, glass=loading.glass, home=self._home(task, path))
+            self._scene = load_scene(path, options)
             self._loaded = wanted
         return self._scene
 
@@ -95,40 +105,37 @@ class Desk:
         folder = self._folder_of(source)
         return None if source.trusted else folder if path.is_relative_to(folder) else path.parent
 
-    def gpu(self, task: Task) -> GpuScene:
+    def gpu(self, task: Task, loading: Loading) -> GpuScene:
         """The scene on the GPU: all views of a scene reuse one upload."""
         from renderer.context import gl_context
         from renderer.gpu_scene import GpuScene
 
-        scene = self.scene(task)
+        scene = self.scene(task, loading)
         if self._gpu is None:
             self._gpu = GpuScene(gl_context(), scene)
             self._compiled = set()
         return self._gpu
 
-    def compiled(self, task: Task) -> set[str]:
+    def compiled(self, task: Task, loading: Loading) -> set[str]:
         """Names of the techniques whose shaders were compiled for the scene on the GPU."""
-        self.gpu(task)
+        self.gpu(task, loading)
         return self._compiled
 
-    def frame(self, task: Task) -> Frame:
+    def frame(self, task: Task, picture: Pictured) -> Frame:
         """The frame of a task's view on the GPU."""
         from renderer.frame import Frame
-        from schemas.view import View
 
-        width, height = task.params["size"]
-        return Frame(self.gpu(task), View.model_validate(task.params["view"]), width, height)
+        return Frame(self.gpu(task, picture), picture.view, *picture.size)
 
 
 def save_facts(folder: Path, facts: Facts) -> None:
     """Writes what the pipeline has to know of an artifact."""
-    (folder / FACTS).write_text(json.dumps(facts, allow_nan=False), encoding="utf-8")
+    (folder / FACTS).write_text(json.dumps(facts.model_dump(mode="json"), allow_nan=False), encoding="utf-8")
 
 
-def load_facts(folder: Path) -> Facts:
+def load_facts(folder: Path, kind: type[F]) -> F:
     """Reads what `save_facts` wrote."""
-    facts: dict[str, Any] = json.loads((folder / FACTS).read_text(encoding="utf-8"))
-    return facts
+    return kind.model_validate_json((folder / FACTS).read_text(encoding="utf-8"))
 
 
 def _present(source: Source | None, task: Task) -> Source:

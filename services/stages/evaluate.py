@@ -6,55 +6,108 @@ that a new bundle renders only its own pictures.
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-from numpy.typing import NDArray
+from schemas.bundle import network_digest
+from schemas.tail import TailName
+from services.stages.inputs import EvaluateFacts
+from services.stages.pictured import Pictured
+from services.stages.stage import Stage
+from services.tasks import Source, Task
 
-from renderer.frame import Frame
-from renderer.techniques import Budget, KBuffer, KBufferDeep, KBufferImportance, KBufferOptimal
-from schemas.measurement import Measurement
-from services.stages.allocations import read_allocation
-from services.stages.desk import Desk, save_facts
-from services.stages.shots import Session, Shot
-from services.tasks import Report, Task
+if TYPE_CHECKING:
+    from services.plan import Plan
+    from services.records import LabelledView
+
+EvaluationKind = Literal["baseline", "bundle"]
 
 
-def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
-    """Writes the pictures and their measurements.
+class EvaluateParams(Pictured):
+    """What is measured of a view.
 
-    Raises:
-        Problem: A GL picture differs from the CPU simulation of the same allocation.
+    Attributes:
+        kind: The techniques that need no bundle, or a bundle.
+        budgets: F of each budget, fragments.
+        factors: The same as multiples of width * height.
+        tail: How the fragments beyond k are averaged; a bundle has its own.
+        g: Steepness of the density tail.
     """
-    measured = (_baseline if task.params["kind"] == "baseline" else _bundle)(desk, task, folder, report)
-    save_facts(folder, {"measurements": [m.model_dump(mode="json", exclude={"scene"}) for m in measured]})
+
+    kind: EvaluationKind
+    budgets: tuple[int, ...]
+    factors: tuple[float, ...]
+    tail: TailName
+    g: float
 
 
-def _shots(session: Session, folder: Path) -> list[Shot]:
-    params = session.task.params
-    return [Shot(session, folder, *budget) for budget in zip(params["factors"], params["budgets"], strict=True)]
+class Evaluate(Stage[EvaluateParams, EvaluateFacts]):
+    """Renders and measures views."""
+
+    name, role, title, share = "evaluate", "render", "evaluate pictures", 10.0
+    after = ("label", "export")
+    params, facts = EvaluateParams, EvaluateFacts
+
+    def ask(
+        self,
+        plan: Plan,
+        view: LabelledView,
+        kind: EvaluationKind,
+        bundle: Source | None = None,
+        export: Task | None = None,
+    ) -> Task:
+        """The task of a view: with the techniques that need no bundle, or with a bundle.
+
+        Args:
+            plan: Budgets and picture.
+            view: The view.
+            kind: `baseline` or `bundle`.
+            bundle: The bundle, for its digest and, if it is published, its files.
+            export: The task that exported it, if it is not published.
+        """
+        options = plan.options
+        params = EvaluateParams(
+            view=view.rendered.view,
+            size=(options.width, options.height),
+            alpha=options.alpha,
+            glass=options.glass,
+            kind=kind,
+            budgets=plan.budgets,
+            factors=plan.factors,
+            tail=options.tail,
+            g=options.g,
+        )
+        made_from = [view.rendered.task.address.key, view.task.address.key]
+        needs = [view.rendered.task.artifact, view.task.artifact]
+        if export is not None:
+            needs.append(export.artifact)
+        published = bundle is not None and export is None
+        return self.task(
+            f"{view.rendered.title} {'published ' if published else ''}{kind}",
+            params,
+            inputs=(*made_from, _network(bundle)) if bundle is not None else made_from,
+            needs=needs,
+            scene=view.scene.source,
+            bundle=bundle,
+        )
+
+    def known(self, task: Task) -> str:
+        """See `Stage.known`."""
+        return f"{self.params_of(task).kind} pictures already rendered"
 
 
-def _baseline(desk: Desk, task: Task, folder: Path, report: Report) -> list[Measurement]:
-    session = Session(desk, task)
-    shots, total, labels = _shots(session, folder), session.dump.total, desk.artifact(task, "label")
-    measured = [Shot(session, folder, total / session.frame.pixels, total).take_exact()]
-    for number, shot in enumerate(shots, start=1):
-
-        def oracle(frame: Frame, _: Budget, fragments: int = shot.fragments) -> NDArray[np.int32]:
-            full_size = frame is session.frame
-            return read_allocation(labels, "optimal", fragments) if full_size else np.ones(frame.pixels, np.int32)
-
-        measured += [shot.take(technique) for technique in (KBuffer(), KBufferImportance(), KBufferOptimal(oracle))]
-        report(number / len(shots), f"{number} of {len(shots)} budgets")
-    return measured
+EVALUATE = Evaluate()
 
 
-def _bundle(desk: Desk, task: Task, folder: Path, report: Report) -> list[Measurement]:
-    technique = KBufferDeep(desk.bundle(task))
-    shots = _shots(Session(desk, task, technique.manifest.tail), folder)
-    measured = []
-    for number, shot in enumerate(shots, start=1):
-        measured.append(shot.take(technique))
-        report(number / len(shots), f"{number} of {len(shots)} budgets")
-    return measured
+def evaluated_from(inputs: Sequence[str]) -> tuple[str, str]:
+    """The artifacts (`stage/key`) of fragments and of labels that an evaluation was made from.
+
+    Args:
+        inputs: Of its address.
+    """
+    return f"render/{inputs[0]}", f"label/{inputs[1]}"
+
+
+def _network(bundle: Source) -> str:
+    """Names the network of a bundle: its pictures are the same before and after it has a model card."""
+    return network_digest(bundle.files) if bundle.files else bundle.digest

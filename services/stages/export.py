@@ -2,75 +2,125 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
+from schemas.glass import GlassReading
+from schemas.pixel_weights import PixelWeights
+from schemas.tail import TailName
+from services.stages.stage import Facts, Params, Stage, training_version
+from services.tasks import Task
 
-from labeller.shards import read_shard
-from renderer.context import gl_context
-from schemas.bundle import WEIGHTS, Provenance, TailSpec
-from services.registry import bundle_digest
-from services.stages.desk import BUNDLE, SHARD, Desk, load_facts, save_facts
-from services.stages.inputs import METRIC
-from services.store import file_sha256
-from services.tasks import Facts, Report, Task
-from services.versions import diaphane_version, machine
-from trainer.bundle import Description, export_bundle
-from trainer.weights import load_weights
-
-PARITY_ROWS = 100_000
-"""Real inputs on which torch, ONNX and GLSL must agree."""
+if TYPE_CHECKING:
+    from services.plan import Plan
 
 
-def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
-    """Writes the bundle.
+class Settings(Params):
+    """What a user set, for provenance; see `schemas.options.Options`.
 
-    Raises:
-        Problem: The exported forms do not agree.
+    Attributes:
+        alpha: Opacity of every surface; None: the materials' own.
+        glass: How surfaces that transmit light are read.
+        size: Width and height in pixels.
+        budgets: As multiples of width * height.
+        tail: How the fragments beyond k are averaged.
+        g: Steepness of the density tail.
+        seed: Of everything drawn at random.
+        weights: What a pixel's errors count in training.
     """
-    trained = desk.artifact(task, "train")
-    shards = [desk.store.fetch(need) / SHARD for need in task.needs if need.startswith("label/")]
-    weights = load_weights(trained / WEIGHTS)
-    description = _description(task, load_facts(trained), len(shards))
-    bundle = folder / BUNDLE
-    manifest = export_bundle(bundle, weights, description, _parity_inputs(shards), gl_context())
-    report(1.0, f"{manifest.parity.count:,} inputs, largest difference {manifest.parity.worst:.1e}")
-    files = {path.name: file_sha256(path) for path in sorted(bundle.iterdir())}
-    save_facts(folder, {"digest": bundle_digest(bundle), "files": files, "parity": manifest.parity.worst})
+
+    alpha: float | None
+    glass: GlassReading
+    size: tuple[int, int]
+    budgets: tuple[float, ...]
+    tail: TailName
+    g: float
+    seed: int
+    weights: PixelWeights
 
 
-def _description(task: Task, trained: Facts, views: int) -> Description:
-    params = task.params
-    settings = params["settings"]
-    return Description(
-        name=params["name"],
-        tail=TailSpec(name=settings["tail"], g=settings["g"]),
-        metric=METRIC,
-        provenance=Provenance(
-            scenes=params["scenes"],
-            holdout=params["holdout"],
-            licences=params["licences"],
-            code_version=params["code"],
-            seed=settings["seed"],
-            machine=", ".join(machine().values()),
-            settings={
-                "diaphane": diaphane_version(),
-                "alpha": settings["alpha"],
-                "size": settings["size"],
-                "budgets": settings["budgets"],
-                **({"glass": settings["glass"]} if "glass" in settings else {}),
-                **({"weights": settings["weights"]} if "weights" in settings else {}),
-                "views": views,
-                "training": trained["config"],
-            },
-        ),
-        evaluation={"training": trained["history"][-1]},
-    )
+class ExportParams(Params):
+    """What is said of a bundle.
+
+    Attributes:
+        name: Of the bundle.
+        scenes: Label -> digest of what was trained on.
+        holdout: Label -> digest of what was not.
+        licences: Label -> licence of all of them, as far as they are known.
+        settings: What a user set.
+        code: Code version of whatever decides what a bundle is.
+    """
+
+    name: str
+    scenes: dict[str, str]
+    holdout: dict[str, str]
+    licences: dict[str, str]
+    settings: Settings
+    code: str
 
 
-def _parity_inputs(shards: Sequence[Path]) -> NDArray[np.float32]:
-    """Rows spread over all training views: at least `PARITY_ROWS`, or all there are."""
-    rows = np.concatenate([read_shard(shard).features for shard in shards])
-    return rows[:: max(1, len(rows) // PARITY_ROWS)]
+class ExportFacts(Facts):
+    """What is known of a bundle.
+
+    Attributes:
+        digest: Over its files, before it has a card.
+        files: Name -> hex sha256.
+        parity: Largest difference between its forms.
+    """
+
+    digest: str
+    files: dict[str, str]
+    parity: float
+
+
+class Export(Stage[ExportParams, ExportFacts]):
+    """Writes bundles, if their forms agree."""
+
+    name, role, title, share = "export", "train", "export and parity", 2.0
+    after = ("train",)
+    params, facts = ExportParams, ExportFacts
+
+    def ask(
+        self,
+        plan: Plan,
+        train: Task,
+        scenes: Mapping[str, str],
+        held_out: Mapping[str, str],
+        licences: Mapping[str, str],
+    ) -> Task:
+        """The task of a bundle.
+
+        Args:
+            plan: Name and options.
+            train: The training.
+            scenes: Label -> digest of what was trained on.
+            held_out: Label -> digest of what was not.
+            licences: Label -> licence of all of them, as far as they are known.
+        """
+        options = plan.options
+        settings = Settings(
+            alpha=options.alpha,
+            glass=options.glass,
+            size=(options.width, options.height),
+            budgets=plan.factors,
+            tail=options.tail,
+            g=options.g,
+            seed=options.seed,
+            weights=options.weights,
+        )
+        params = ExportParams(
+            name=plan.name,
+            scenes=dict(scenes),
+            holdout=dict(held_out),
+            licences=dict(licences),
+            settings=settings,
+            code=training_version(),
+        )
+        return self.task(plan.name, params, inputs=(train.address.key,), needs=(train.artifact, *train.needs))
+
+    def known(self, task: Task) -> str:
+        """See `Stage.known`."""
+        return "bundles already exported"
+
+
+EXPORT = Export()

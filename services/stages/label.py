@@ -2,68 +2,94 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING
 
-from labeller.allocation import RULES, Allocation
-from labeller.curves import error_curves, whole_bins
-from labeller.flip_weights import flip_weights
-from labeller.hull import lower_hulls
-from labeller.rules import allocate_curves
-from labeller.shards import write_shard
-from labeller.skips import budget_skips, needed_budgets, pixel_skips
-from renderer.dump import read_dump
-from schemas.pixel_weights import DEFAULT_WEIGHTS
-from services.stages.allocations import write_allocations
-from services.stages.desk import SHARD, Desk, save_facts
-from services.tasks import Report, Task
+from schemas.pixel_weights import PixelWeights
+from schemas.skips import LABELLED_VIEWS
+from schemas.tail import MetricName, TailName
+from services.stages.inputs import METRIC
+from services.stages.stage import Facts, Params, Stage
+from services.tasks import Task
 
-Answer = TypeVar("Answer")
+if TYPE_CHECKING:
+    from services.plan import Plan
+    from services.records import RenderedView
 
 
-def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
-    """Writes the allocations and the shard, and the errors of all rules."""
-    params = task.params
-    dump = read_dump(desk.artifact(task, "render"))
-    curves = error_curves(dump, params["tail"], params["g"], params["metric"])
-    hulls = lower_hulls(curves)
-    report(0.3, f"curves of {dump.total:,} fragments")
-    budgets = needed_budgets(params["budgets"], dump.total)
-    made = {rule: allocate_curves(dump, curves, budgets, rule, hulls=hulls) for rule in RULES}
-    write_allocations(folder, made)
-    report(0.8, f"{len(RULES)} rules at {len(budgets)} budgets")
-    weights = params.get("weights", DEFAULT_WEIGHTS)
-    if weights == "flip":
-        # What is compared with other rules is not weighted; what is learned is.
-        counted = flip_weights(dump, [found.k for found in made["optimal"]], params["tail"], params["g"])
-        curves = error_curves(dump, params["tail"], params["g"], params["metric"], counted)
-    cuts = whole_bins(dump, curves)
-    written = write_shard(folder / SHARD, dump, cuts, lower_hulls(cuts), budgets, seed=params["seed"], weights=weights)
-    facts = {
-        "errors": {rule: _answers(params["budgets"], allocations, _error, 0.0) for rule, allocations in made.items()},
-        "certificates": _answers(params["budgets"], made["optimal"], _certificate, _EXACT),
-        "shard": {"sha256": written.sha256, "bytes": written.bytes},
-        "skips": {**pixel_skips(dump, hulls), **budget_skips(params["budgets"], dump.total)},
-    }
-    save_facts(folder, facts)
+class LabelParams(Params):
+    """How a view is labelled.
+
+    Attributes:
+        budgets: F of each budget, fragments, in the order asked.
+        tail: How the fragments beyond k are averaged.
+        g: Steepness of the density tail.
+        metric: Error that the labels are made for.
+        seed: Of the sampled pixels.
+        weights: What a pixel's errors count in the rows that are trained on.
+    """
+
+    budgets: tuple[int, ...]
+    tail: TailName
+    g: float
+    metric: MetricName
+    seed: int
+    weights: PixelWeights
 
 
-_EXACT = {"error": 0.0, "bound": 0.0, "gap": 0.0}
-"""The certificate of a budget that holds all fragments."""
+class Certified(Facts):
+    """Error of an allocation, what no allocation can be below, and the relative gap between them."""
+
+    error: float
+    bound: float
+    gap: float
 
 
-def _answers(
-    budgets: Sequence[int], allocations: Sequence[Allocation], answer: Callable[[Allocation], Answer], complete: Answer
-) -> list[Answer]:
-    """An answer for each budget in the order asked: the allocation's, or that of a budget that holds everything."""
-    found = {allocation.budget: answer(allocation) for allocation in allocations}
-    return [found.get(budget, complete) for budget in budgets]
+class Shard(Facts):
+    """Hex sha256 and size of the file of training rows."""
+
+    sha256: str
+    bytes: int
 
 
-def _error(a: Allocation) -> float:
-    return a.error
+class LabelFacts(Facts):
+    """What is known of a view's labels.
+
+    Attributes:
+        errors: Rule -> error at each budget.
+        certificates: Of the optimal allocation, one for each budget.
+        shard: The training rows.
+        skips: What took no part, counted.
+    """
+
+    errors: dict[str, tuple[float, ...]]
+    certificates: tuple[Certified, ...]
+    shard: Shard
+    skips: dict[str, int]
 
 
-def _certificate(a: Allocation) -> dict[str, float]:
-    return {"error": a.error, "bound": a.error if a.bound is None else a.bound, "gap": a.gap or 0.0}
+class Label(Stage[LabelParams, LabelFacts]):
+    """Labels views: all budgets in one task."""
+
+    name, role, title, share = "label", "label", "error curves", 6.0
+    after = ("render",)
+    params, facts = LabelParams, LabelFacts
+
+    def ask(self, plan: Plan, view: RenderedView) -> Task:
+        """The task of a view."""
+        options = plan.options
+        params = LabelParams(
+            budgets=plan.budgets,
+            tail=options.tail,
+            g=options.g,
+            metric=METRIC,
+            seed=options.seed,
+            weights=options.weights,
+        )
+        return self.task(view.title, params, inputs=(view.task.address.key,), needs=(view.task.artifact,))
+
+    def known(self, task: Task) -> str:
+        """See `Stage.known`."""
+        return LABELLED_VIEWS
+
+
+LABEL = Label()

@@ -2,18 +2,49 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import TYPE_CHECKING
 
-from renderer.capture import capture
-from renderer.dump import write_dump
-from services.stages.desk import Desk, save_facts
-from services.tasks import Report, Task
+from schemas.view import View
+from services.stages.pictured import Pictured
+from services.stages.stage import Facts, Stage
+from services.tasks import Task
+
+if TYPE_CHECKING:
+    from services.plan import Plan
+    from services.records import SceneEntry
 
 
-def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
-    """Writes the dump, and how many fragments it has and what each pass took, ms."""
-    captured = capture(desk.frame(task))
-    report(0.5, f"{captured.dump.total:,} fragments")
-    write_dump(folder, captured.dump)
-    occupied = int((captured.dump.counts > 0).sum())
-    save_facts(folder, {"total": captured.dump.total, "occupied": occupied, "passes": captured.passes})
+class RenderFacts(Facts):
+    """What was captured.
+
+    Attributes:
+        total: N, all fragments.
+        occupied: Pixels that have any.
+        passes: Milliseconds of each pass.
+    """
+
+    total: int
+    occupied: int
+    passes: dict[str, float]
+
+
+class Render(Stage[Pictured, RenderFacts]):
+    """Captures the fragments of views."""
+
+    name, role, title, share = "render", "render", "capture fragments", 6.0
+    after = ("scene",)
+    params, facts = Pictured, RenderFacts
+
+    def ask(self, plan: Plan, scene: SceneEntry, view: View) -> Task:
+        """The task of a view."""
+        options = plan.options
+        size = options.width, options.height
+        params = Pictured(view=view, size=size, alpha=options.alpha, glass=options.glass)
+        return self.task(f"{scene.label} {view.name}", params, inputs=(scene.digest,), scene=scene.source)
+
+    def known(self, task: Task) -> str:
+        """See `Stage.known`."""
+        return "views already captured"
+
+
+RENDER = Render()

@@ -2,101 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
-from renderer.context import describe, gl_context
-from schemas.measurement import Measurement, ReportData
-from services import summary
-from services.report import Picture, PictureSet, write_report
-from services.stages.desk import PAGE, Desk, load_facts, save_facts
-from services.stages.pictures import EXACT, read_png, stem
-from services.store import file_sha256
-from services.tasks import Report, Task
-from services.versions import library_versions, machine
-
-SHOWN_VIEWS = 2
-"""Views of each held-out scene whose pictures go into the report: more would make the file unwieldy."""
+from services.stages.stage import Facts, Params, Stage
+from services.tasks import Task
 
 
-@dataclass(frozen=True, slots=True)
-class Evaluation:
-    """An `evaluate` artifact and what this run calls its scene.
+class ReportParams(Params):
+    """What a report shows.
 
     Attributes:
-        label: Of the scene.
-        folder: Of the artifact.
+        data: `schemas.measurement.ReportData` without what can be told where it is written, JSON.
+        labels: Of the scene of every evaluation, in the order of the needs.
     """
 
-    label: str
-    folder: Path
-
-    @property
-    def measurements(self) -> list[Measurement]:
-        """Of one view."""
-        records = load_facts(self.folder)["measurements"]
-        return [Measurement.model_validate({**record, "scene": self.label}) for record in records]
+    data: dict[str, Any]
+    labels: tuple[str, ...]
 
 
-def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
-    """Writes the page."""
-    shown = [Evaluation(*pair) for pair in zip(task.params["labels"], map(desk.store.fetch, task.needs), strict=True)]
-    page = write(folder / PAGE, task.params["data"], shown)
-    report(1.0, f"{page.stat().st_size / 1e6:.1f} MB")
-    save_facts(folder, {"sha256": file_sha256(page), "bytes": page.stat().st_size})
+class ReportFacts(Facts):
+    """Hex sha256 and size of the page."""
+
+    sha256: str
+    bytes: int
 
 
-def write(path: Path, data: dict[str, Any], shown: Sequence[Evaluation]) -> Path:
-    """Writes the report of a build.
+class Report(Stage[ReportParams, ReportFacts]):
+    """Writes reports."""
 
-    Args:
-        path: The file.
-        data: `ReportData`, JSON, without what can be told here: measurements, machine, versions.
-        shown: Every evaluation.
-    """
-    complete = ReportData.model_validate(
-        {
-            **data,
-            "measurements": [m for evaluation in shown for m in evaluation.measurements],
-            "machine": {**machine(), "GL": describe(gl_context())},
-            "versions": library_versions(),
-        }
-    )
-    write_report(path, complete, _pictures(shown))
-    return path
+    name, role, title, share = "report", "render", "report", 1.0
+    after = ("evaluate",)
+    params, facts = ReportParams, ReportFacts
 
+    def ask(self, name: str, data: Mapping[str, Any], evaluations: Sequence[tuple[str, Task]]) -> Task:
+        """The task of a report.
 
-def _pictures(shown: Sequence[Evaluation]) -> Iterator[PictureSet]:
-    """The first views of each scene, at the middle one of the budgets that are not exact there."""
-    views: dict[tuple[str, str], list[Evaluation]] = {}
-    for evaluation in shown:
-        views.setdefault((evaluation.label, evaluation.measurements[0].view), []).append(evaluation)
-    count: dict[str, int] = {}
-    for (label, view), evaluations in views.items():
-        measured = [m for evaluation in evaluations for m in evaluation.measurements]
-        budgets = sorted({m.budget_factor for m in summary.compared(measured)})
-        if budgets and count.get(label, 0) < SHOWN_VIEWS:
-            count[label] = count.get(label, 0) + 1
-            yield _picture_set(label, view, evaluations, budgets[len(budgets) // 2])
+        Args:
+            name: Of the report.
+            data: See `ReportParams`.
+            evaluations: Label of the scene and task, for every evaluation that is shown.
+        """
+        params = ReportParams(data=dict(data), labels=tuple(label for label, _ in evaluations))
+        made = [task for _, task in evaluations]
+        return self.task(
+            name, params, inputs=[task.address.key for task in made], needs=[task.artifact for task in made]
+        )
+
+    def known(self, task: Task) -> str:
+        """See `Stage.known`."""
+        return "reports already written"
 
 
-def _picture_set(label: str, view: str, evaluations: Sequence[Evaluation], factor: float) -> PictureSet:
-    techniques = {}
-    for evaluation in evaluations:
-        for m in summary.compared(evaluation.measurements):
-            if m.budget_factor == factor:
-                techniques[m.technique] = _picture(evaluation.folder, stem(m.technique, factor))
-    exact = next(e.folder / EXACT for e in evaluations if (e.folder / EXACT).exists())
-    return PictureSet(scene=label, view=view, budget_factor=factor, exact=read_png(exact), techniques=techniques)
-
-
-def _picture(folder: Path, base: str) -> Picture:
-    return Picture(
-        image=read_png(folder / f"{base}.png"),
-        flip=read_png(folder / f"{base}.flip.png").astype(np.float32) / np.float32(255.0),
-        k=read_png(folder / f"{base}.k.png"),
-    )
+REPORT = Report()

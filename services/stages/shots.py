@@ -23,8 +23,8 @@ from schemas.fragments import FragmentDump
 from schemas.measurement import Measurement
 from schemas.problem import ExitCode, Problem
 from schemas.tail import TailName
-from schemas.view import View
 from services.stages.desk import Desk
+from services.stages.evaluate import EvaluateParams
 from services.stages.pictures import EXACT, counts_map, quantise_map, stem, write_png
 from services.tasks import Task
 
@@ -40,18 +40,19 @@ class Session:
     Args:
         desk: Artifacts and the scene on the GPU.
         task: The evaluation.
+        params: Its parameters.
         trained: Tail of the bundle that is evaluated, which it renders whatever the task asks for; None: none is.
     """
 
-    def __init__(self, desk: Desk, task: Task, trained: TailSpec | None = None) -> None:
-        self.desk, self.task = desk, task
-        self.tail: TailName = task.params["tail"] if trained is None else trained.name
-        self.g: float = task.params["g"] if trained is None else trained.g
+    def __init__(self, desk: Desk, task: Task, params: EvaluateParams, trained: TailSpec | None = None) -> None:
+        self.desk, self.task, self.params = desk, task, params
+        self.tail: TailName = params.tail if trained is None else trained.name
+        self.g: float = params.g if trained is None else trained.g
 
     @cached_property
     def frame(self) -> Frame:
         """The view on the GPU."""
-        return self.desk.frame(self.task)
+        return self.desk.frame(self.task, self.params)
 
     @cached_property
     def dump(self) -> FragmentDump:
@@ -70,15 +71,15 @@ class Session:
 
     def simulate(self, k: NDArray[np.int32]) -> NDArray[np.float32]:
         """The CPU's picture of an allocation, linear float32 [H, W, 3]."""
-        width, height = self.task.params["size"]
+        width, height = self.params.size
         return composite(self.dump, k, self.tail, self.g).reshape(height, width, 3)
 
     def render(self, technique: Technique, budget: Budget) -> Rendered:
         """A technique's picture; drivers compile shaders at their first use, so that is not the one measured."""
-        compiled = self.desk.compiled(self.task)
+        compiled = self.desk.compiled(self.task, self.params)
         if technique.name not in compiled:
             compiled.add(technique.name)
-            small = Frame(self.desk.gpu(self.task), View.model_validate(self.task.params["view"]), *_WARM_SIZE)
+            small = Frame(self.desk.gpu(self.task, self.params), self.params.view, *_WARM_SIZE)
             share = max(1, budget.fragments * small.pixels // self.frame.pixels)
             technique.render(small, Budget(share, budget.tail, budget.g))
         return technique.render(self.frame, budget)
@@ -173,18 +174,18 @@ class Shot:
 
     def _record(self, name: str, **measured: Any) -> Measurement:
         """Without the scene's label, which is no part of the artifact: another run may call the scene otherwise."""
-        params = self.session.task.params
-        width, height = params["size"]
+        params = self.session.params
+        width, height = params.size
         return Measurement(
             scene="",
-            view=params["view"]["name"],
+            view=params.view.name,
             technique=name,
             budget=self.fragments,
             budget_factor=self.factor,
             width=width,
             height=height,
-            alpha=params["alpha"],
-            glass=params["glass"],
+            alpha=params.alpha,
+            glass=params.glass,
             tail=self.session.tail,
             total_fragments=self.session.dump.total,
             **measured,

@@ -2,93 +2,71 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-from labeller.dataset import open_dataset
-from schemas.bundle import WEIGHTS
-from schemas.measurement import TrainingPoint
-from services.report.live import write_live
-from services.stages.desk import SHARD, Desk, save_facts
-from services.stages.inputs import TrainedOn, trained_on
-from services.tasks import Report, Source, Task
-from trainer.bundle import load_bundle
-from trainer.log import read_log
-from trainer.train import TrainConfig, train
-from trainer.views import ShardView, open_views
-from trainer.weights import Weights, save_weights
+from schemas.network import NetworkSize
+from services.stages.inputs import REPLAYED, TrainFacts
+from services.stages.stage import Params, Stage
+from services.tasks import Source, Task
 
-FINE_TUNING = 0.25
-"""Learning rate of a training that begins with a champion's weights, as a multiple of the usual one: the full rate
-throws away what they know within its first steps."""
-
-LOG = "log.jsonl"
-"""File of a `train` artifact: how the training went, a JSON object a line (`trainer.log`)."""
+if TYPE_CHECKING:
+    from services.plan import Plan
 
 
-def make(desk: Desk, task: Task, folder: Path, report: Report) -> None:
-    """Writes the weights, and how the training went. Interrupted, it goes on from its last checkpoint.
+class TrainParams(Params):
+    """How a network is trained.
 
-    Raises:
-        Problem: There is nothing to learn from.
+    Attributes:
+        seed: Of the weights and batches.
+        steps: Optimiser steps; None: the trainer's default.
+        network: Size of the network.
+        patience: Validations without a better score after which the training stops; 0: never.
+        start: Digest of the bundle whose weights the training begins with; None: none.
+        replay: Digest of the shards of an earlier data set that are trained on as well; None: none.
     """
-    start = None if task.bundle is None else load_bundle(desk.bundle(task)).weights
-    config = _config(task, start)
-    shards = trained_on(task.inputs)
-    views = _opened(desk, [shard for shard in shards if not shard.replayed])
-    replay = _opened(desk, [shard for shard in shards if shard.replayed])
-    if task.replay is not None:
-        replay += _replayed(task.replay)
-    checkpoint = desk.checkpoint(task)
-    log, page = checkpoint.with_suffix(".jsonl"), checkpoint.with_name(f"{task.name}.html")
 
-    def progress(step: int, steps: int, loss: float, score: float) -> None:
-        report(step / steps, f"step {step}: loss {loss:.3f}, error / optimum {score:.2f}")
-        write_live(page, task.name, read_log(log), steps)
-
-    # No held-out view has a say in which state is kept: they are for the evaluation alone.
-    result = train(views, (), config, progress, checkpoint, start, replay, log)
-    save_weights(folder / WEIGHTS, result.weights)
-    write_live(page, task.name, read_log(log), config.steps, is_over=True)
-    history = [
-        TrainingPoint(step=point.step, loss=point.loss, over_optimum=point.score).model_dump()
-        for point in result.history
-    ]
-    facts = {"history": history, "config": config.model_dump(mode="json"), "kept_out": list(result.kept_out)}
-    save_facts(folder, facts)
-    if log.exists():
-        shutil.copyfile(log, folder / LOG)
-    checkpoint.unlink(missing_ok=True)
-    log.unlink(missing_ok=True)
+    seed: int
+    steps: int | None
+    network: NetworkSize
+    patience: int
+    start: str | None
+    replay: str | None
 
 
-def _config(task: Task, start: Weights | None) -> TrainConfig:
-    """Settings of the training. A network that is begun with keeps its own inputs and units."""
-    given: dict[str, Any] = {"seed": task.params["seed"], "patience": task.params.get("patience", 0)}
-    if task.params["steps"] is not None:
-        given["steps"] = task.params["steps"]
-    config = TrainConfig.sized(task.params["network"], **given)
-    if start is None:
-        return config
-    own = {"features": start.features, "hidden": start.hidden}
-    return config.model_copy(update={**own, "lr": FINE_TUNING * config.lr})
+class Train(Stage[TrainParams, TrainFacts]):
+    """Trains networks."""
+
+    name, role, title, share = "train", "train", "train", 20.0
+    after = ("label",)
+    params, facts = TrainParams, TrainFacts
+
+    def ask(self, plan: Plan, shards: Sequence[tuple[str, str]], start: Source | None) -> Task:
+        """The task of a network.
+
+        Args:
+            plan: Options, and what is replayed.
+            shards: Digest of the asset and label artifact of every training view: an asset's label decides which views
+                are weighted together, so it belongs to the key.
+            start: Bundle whose weights the training begins with.
+        """
+        options = plan.options
+        inputs = [f"{digest}:{artifact.partition('/')[2]}" for digest, artifact in shards]
+        inputs += [f"{digest}:{artifact.partition('/')[2]}{REPLAYED}" for digest, artifact in plan.replayed]
+        params = TrainParams(
+            seed=options.seed,
+            steps=options.steps,
+            network=options.network,
+            patience=options.patience,
+            start=None if start is None else start.digest,
+            replay=None if plan.replay is None else plan.replay.digest,
+        )
+        needs = tuple(artifact for _, artifact in (*shards, *plan.replayed))
+        return self.task(plan.name, params, inputs=inputs, needs=needs, bundle=start, replay=plan.replay)
+
+    def known(self, task: Task) -> str:
+        """See `Stage.known`."""
+        return "models already trained"
 
 
-def _opened(desk: Desk, shards: Sequence[TrainedOn]) -> list[ShardView]:
-    """The views of label artifacts, assets named by the content of their scenes."""
-    if not shards:
-        return []
-    return open_views([desk.store.fetch(s.artifact) / SHARD for s in shards], [s.scene for s in shards])
-
-
-def _replayed(source: Source) -> list[ShardView]:
-    """The views of an earlier data set, assets named by the content of their scenes."""
-    dataset = open_dataset(Path(source.folder or ""))
-    entries = [entry for entry in dataset.index.shards if source.files.get(entry.file) == entry.header_sha256]
-    return open_views(
-        [dataset.folder / entry.file for entry in entries],
-        [entry.source.scene for entry in entries],
-        [entry.header_sha256 for entry in entries],
-    )
+TRAIN = Train()

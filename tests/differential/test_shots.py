@@ -14,6 +14,9 @@ from renderer.frame import Frame
 from renderer.techniques import KBufferImportance
 from schemas.colour import display8
 from schemas.fragments import FragmentDump
+from schemas.glass import DEFAULT_GLASS
+from schemas.view import View
+from services.stages.evaluate import EvaluateParams
 from services.stages.pictures import read_png
 from services.stages.shots import Session, Shot
 
@@ -22,12 +25,21 @@ def test_a_shot_keeps_the_picture_linear_and_displayed_and_its_counts(
     frame: Frame, dump: FragmentDump, tmp_path: Path
 ) -> None:
     write_dump(tmp_path, dump)
-    params = {"tail": "density-16", "g": 0.75, "size": [dump.width, dump.height], "view": {"name": "front"}}
-    task = SimpleNamespace(params={**params, "alpha": None}, name="scene front")
-    desk = SimpleNamespace(
-        frame=lambda _: frame, artifact=lambda *_: tmp_path, compiled=lambda _: {"kbuffer-importance", "sbuffer"}
+    params = EvaluateParams(
+        view=View(name="front", eye=(0.0, 0.0, 5.0), target=(0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
+        size=(dump.width, dump.height),
+        alpha=None,
+        glass=DEFAULT_GLASS,
+        kind="baseline",
+        budgets=(dump.pixels,),
+        factors=(1.0,),
+        tail="density-16",
+        g=0.75,
     )
-    session = Session(desk, task)  # type: ignore[arg-type]
+    desk = SimpleNamespace(
+        frame=lambda *_: frame, artifact=lambda *_: tmp_path, compiled=lambda *_: {"kbuffer-importance", "sbuffer"}
+    )
+    session = Session(desk, SimpleNamespace(name="scene front"), params)  # type: ignore[arg-type]
     shots = tmp_path / "shots"
     shots.mkdir()
     shot = Shot(session, shots, 1.0, dump.pixels)

@@ -12,6 +12,7 @@ import pytest
 from labeller.dataset import open_dataset
 from renderer.samples import write_samples
 from schemas.bundle import load_manifest
+from schemas.options import Options
 from schemas.problem import Problem
 from schemas.tail import DEFAULT_TAIL
 from services import steps, summary
@@ -35,15 +36,13 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def options(
     samples: Path, state: Path, scenes: tuple[str, ...] = (*TRAIN, HELD_OUT), **changes: object
 ) -> BuildOptions:
+    usual = Options(budgets=(1.0, 2.0), width=176, height=118, views_per_scene=2, steps=200)
+    own = {name: changes.pop(name) for name in Options.model_fields.keys() & changes.keys()}
     settings: dict[str, object] = {
         "scenes": tuple(samples / name for name in scenes),
         "name": "small",
+        "options": Options(**{**usual.model_dump(), **own}),
         "holdout": (samples / HELD_OUT,),
-        "budgets": (1.0, 2.0),
-        "width": 176,
-        "height": 118,
-        "views_per_scene": 2,
-        "steps": 200,
         "state": state,
     }
     return BuildOptions(**{**settings, **changes})  # type: ignore[arg-type]
@@ -188,10 +187,7 @@ def test_an_opaque_scene_that_is_held_out_by_itself_is_not_scored(samples: Path,
     wanted = BuildOptions(
         scenes=(samples / TRAIN[0], solid),
         name="unscored",
-        budgets=(1.0,),
-        width=64,
-        height=48,
-        steps=20,
+        options=Options(budgets=(1.0,), width=64, height=48, steps=20),
         state=tmp_path / "state",
     )
     assert wanted.holdout == (solid,), "the automatic choice"
@@ -208,19 +204,16 @@ def test_an_opaque_scene_that_is_held_out_by_itself_is_not_scored(samples: Path,
 def test_opaque_scene_is_refused_with_the_way_out(tmp_path: Path) -> None:
     scene = tmp_path / "solid.usda"
     scene.write_text('#usda 1.0\n(defaultPrim = "C")\ndef Cube "C" {}\n', encoding="utf-8")
-    wanted = BuildOptions(scenes=(scene,), name="solid", width=64, height=48, state=tmp_path / "state", steps=20)
+    small = Options(width=64, height=48, steps=20)
+    wanted = BuildOptions(scenes=(scene,), name="solid", options=small, state=tmp_path / "state")
     with pytest.raises(Problem, match=r"solid.*--alpha 0\.33"):
         build(wanted, SilentProgress())
     made = build(
         BuildOptions(
             scenes=(scene,),
             name="solid",
-            alpha=0.33,
-            budgets=(0.25,),
-            width=64,
-            height=48,
+            options=Options(budgets=(0.25,), alpha=0.33, width=64, height=48, steps=20),
             state=tmp_path / "state",
-            steps=20,
         ),
         SilentProgress(),
     )

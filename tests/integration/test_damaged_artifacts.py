@@ -25,6 +25,9 @@ from services.engine import problems
 from services.problems import document_of, without_paths
 from services.stages.allocations import pixel_allocations, read_allocation
 from services.stages.desk import BUNDLE, SHARD, load_facts, save_facts
+from services.stages.export import ExportFacts
+from services.stages.inputs import TrainFacts
+from services.stages.label import LabelFacts
 from services.store import Address, Store
 from trainer.weights import load_weights, save_weights
 
@@ -48,10 +51,13 @@ READERS: dict[str, tuple[Callable[[Path], Any], ...]] = {
         lambda folder: read_allocation(folder, "optimal", F),
         lambda folder: pixel_allocations(folder, F, 0),
         lambda folder: read_shard(folder / SHARD),
-        load_facts,
+        lambda folder: load_facts(folder, LabelFacts),
     ),
-    "train": (lambda folder: load_weights(folder / "weights.safetensors"), load_facts),
-    "export": (lambda folder: load_manifest(folder / BUNDLE), load_facts),
+    "train": (
+        lambda folder: load_weights(folder / "weights.safetensors"),
+        lambda folder: load_facts(folder, TrainFacts),
+    ),
+    "export": (lambda folder: load_manifest(folder / BUNDLE), lambda folder: load_facts(folder, ExportFacts)),
 }
 """What the bodies of stages read of the artifacts that they need."""
 
@@ -62,10 +68,11 @@ def _made(api: Api, filled: Filled, stage: str) -> Address:
         return view.render if stage == "render" else view.label
     address = Address(stage, "v1")
     with api.service.storage.store.put(address) as folder:
-        save_facts(folder, {"history": []})
         if stage == "train":
+            save_facts(folder, TrainFacts(history=(), config={}))
             save_weights(folder / "weights.safetensors", random_weights(1))
         else:
+            save_facts(folder, ExportFacts(digest="", files={}, parity=0.0))
             make_bundle(folder / BUNDLE)
     return address
 

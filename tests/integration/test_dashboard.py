@@ -23,7 +23,7 @@ from services.dashboard import OPEN_PAGES, PAGES, SESSION_ANSWERS, assets, model
 from services.dashboard.page import duration, is_local
 from services.dashboard.sessions import form_token
 from services.database import Database, tables
-from services.engine.progress import SHARES
+from services.engine.progress import STAGES_OF
 
 PARTS = {
     "job_id": "job_" + "0" * 24,
@@ -264,12 +264,12 @@ def test_pages_with_data(admin: Visitor, shown: Shown) -> None:
     assert re.search(r"Nobody works for render, train:", text["/"])
     assert re.search(r'data-stream="/changes\?seen=[0-9a-f]{16}"', text["/"])
     job = text[f"/jobs/{shown.running}"]
-    assert [re.findall(r"<h3>(\w+)</h3>", job)] == [list(SHARES["build"])]
+    assert [re.findall(r"<h3>(\w+)</h3>", job)] == [list(STAGES_OF["build"])]
     assert "1 quarantined" in job
     assert "after label and export" in job
     assert f"/jobs/{shown.running}/events?after=" in job
     assert "Add scenes." in text[f"/jobs/{shown.failed}"]
-    assert text[f"/jobs/{shown.failed}"].count("s-unreached") == 2 * len(SHARES["build"])
+    assert text[f"/jobs/{shown.failed}"].count("s-unreached") == 2 * len(STAGES_OF["build"])
     assert "data-stream" not in text[f"/jobs/{shown.failed}"]
     assert f"/jobs/{shown.built}/report" in text[f"/jobs/{shown.built}"]
     model = text["/models/glass"]

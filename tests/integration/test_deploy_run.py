@@ -20,7 +20,7 @@ from support.processes import Service
 from support.s3 import S3Server
 from support.solids import SPHERE_AND_CUBE
 
-from services.tasks import STAGE_ROLE
+from services.stages.catalogue import STAGES
 
 SAME_AS_RENDER = "render-gpu"
 SERVICES = sorted(set(own_services()) - {SAME_AS_RENDER})
@@ -111,7 +111,7 @@ def test_together_they_build_from_upload_to_published_version(running: Running, 
     assert job["state"] == "succeeded", [job["problem"], *(task["problem"] for task in tasks)]
     by_role: dict[str, set[str]] = {}
     for task in tasks:
-        by_role.setdefault(STAGE_ROLE[task["stage"]], set()).add(task["executor"])
+        by_role.setdefault(STAGES[task["stage"]].role, set()).add(task["executor"])
     assert set(by_role) == {"render", "label", "train"}
     assert all(len(executors) == 1 for executors in by_role.values())
     shown = running.cli("models", "show", "tiny")

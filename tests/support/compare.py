@@ -17,14 +17,18 @@ from renderer.exr import write_exr
 from schemas.colour import display8
 from schemas.fragments import FragmentDump
 from schemas.measurement import Measurement
+from schemas.tail import TailName
 from schemas.view import View as Camera
-from services.stages import label
+from services.stages.desk import save_facts
+from services.stages.label import LABEL, LabelParams
+from services.stages.making import label as making
 from services.stages.pictures import counts_map, quantise_map, stem, write_png
 from services.store import Address
 from support.api import Api, measurement
 from support.dumps import random_dump
 
-TAIL, G = "density-16", 0.75
+TAIL: TailName = "density-16"
+G = 0.75
 FACTORS = (1.0, 2.0)
 CAMERA = Camera(name="front", eye=(0.0, 0.0, 3.0), target=(0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
 HOSTILE_VIEW = "<b onclick=x>\"'&?#/../%00"
@@ -80,11 +84,12 @@ def _view(api: Api, digest: str, name: str, size: tuple[int, int], max_n: int, s
     with store.put(render) as folder:
         write_dump(folder, dump)
     budgets = [int(factor * dump.pixels) for factor in FACTORS]
-    params = {"budgets": budgets, "tail": TAIL, "g": G, "metric": "display", "seed": 1}
-    labelled = Address("label", "v1", (render.key,), params)
+    params = LabelParams(budgets=tuple(budgets), tail=TAIL, g=G, metric="display", seed=1, weights="none")
+    task = LABEL.task(name, params, inputs=(render.key,))
+    labelled = task.address
     desk = SimpleNamespace(artifact=lambda task, stage: store.fetch(render.artifact))
     with store.put(labelled) as folder:
-        label.make(desk, SimpleNamespace(params=params), folder, lambda *_: None)  # type: ignore[arg-type]
+        save_facts(folder, making.make(desk, task, params, folder, lambda *_: None))  # type: ignore[arg-type]
     view = View(dump, error_curves(dump, TAIL, G), render, labelled, {})
     for model in (None, *MODELS):
         inputs = (render.key, labelled.key) if model is None else (render.key, labelled.key, model)

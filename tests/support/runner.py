@@ -14,7 +14,7 @@ from schemas.service import DatasetRecord, SceneRecord, ShardRef
 from schemas.tail import DEFAULT_TAIL, DENSITY_G
 from services.progress import SilentProgress
 from services.stages.desk import BUNDLE
-from services.tasks import Facts, StageName, Task
+from services.tasks import JsonFacts, StageName, Task
 from support.bundles import make_bundle
 
 VIEW = {"eye": (0.0, 0.0, 5.0), "target": (0.0, 0.0, 0.0), "up": (0.0, 1.0, 0.0)}
@@ -48,7 +48,7 @@ def measurement(technique: str, mse: float, factor: float = 1.0, view: str = "vi
         tail=DEFAULT_TAIL,
         mse=mse,
         total_fragments=1000,
-    ).model_dump(mode="json", exclude={"scene"})
+    ).model_dump(mode="json")
 
 
 class TableRunner:
@@ -94,7 +94,7 @@ class TableRunner:
         )
         self.measured = SimpleNamespace(record=self._record, record_dataset=self._dataset, dataset=self._known_dataset)
 
-    def map(self, stage: StageName, tasks: Sequence[Task]) -> list[Facts | None]:
+    def map(self, stage: StageName, tasks: Sequence[Task]) -> list[JsonFacts | None]:
         self.asked += tasks
         assert all(task.stage == stage for task in tasks)
         return [None if (stage, task.name) in self.fails else self._facts(task) for task in tasks]
@@ -110,7 +110,7 @@ class TableRunner:
     def of(self, stage: str) -> list[Task]:
         return [task for task in self.asked if task.stage == stage]
 
-    def _facts(self, task: Task) -> Facts:
+    def _facts(self, task: Task) -> JsonFacts:
         if task.stage == "scene":
             views = [{"name": f"view{i}", **VIEW} for i in range(2)]
             return {

@@ -21,9 +21,9 @@ def load() -> None:
     import support.bundles  # noqa: F401
 
 
-def make(stage: str, desk: Any, task: Any, folder: Path, report: Any) -> None:
+def make(stage: Any, desk: Any, task: Any, params: Any, folder: Path, report: Any) -> Any:
     """Makes an artifact of a stage. The larger a job's seed, the better is its bundle."""
-    from services.stages.desk import save_facts
+    from services.stages.catalogue import STAGES
 
     reach(f"{stage}:begin", artifact=task.artifact)
     for need in task.needs:
@@ -33,8 +33,9 @@ def make(stage: str, desk: Any, task: Any, folder: Path, report: Any) -> None:
         time.sleep(0.02)
         report(0.5, "working")
     (folder / DATA).write_bytes(content(task.artifact))
-    save_facts(folder, _FACTS[stage](task, folder, desk))
+    facts = STAGES[stage].facts.model_validate(_FACTS[stage](task, folder, desk))
     reach(f"{stage}:end", artifact=task.artifact)
+    return facts
 
 
 def content(artifact: str) -> bytes:
@@ -101,6 +102,7 @@ def _report(task: Any, folder: Path, desk: Any) -> dict[str, Any]:
 def _measurement(params: dict[str, Any], technique: str, mse: float) -> dict[str, Any]:
     width, height = params["size"]
     return {
+        "scene": "",
         "view": params["view"]["name"],
         "technique": technique,
         "budget": params["budgets"][0],

@@ -38,7 +38,7 @@ POINTS = (
 )
 """Those that every build comes to, in order."""
 GATES, TRACE, FULL = "gates", "trace", "full"
-_STAND_INS = {f"services.stages.{'scenes' if stage == 'scene' else stage}": stage for stage in STAGES}
+_STAND_INS = {f"services.stages.making.{stage}": stage for stage in STAGES}
 _POLL_SECONDS = 0.02
 
 _folder = ""

@@ -29,7 +29,8 @@ from services.registry import Registry, open_registry
 from services.retention import DAY, sweep
 from services.settings import Settings
 from services.stages.inputs import METRIC, trained_on
-from services.stages.tasks import train_task
+from services.stages.label import LabelParams
+from services.stages.train import TRAIN
 from services.storage import Blobs, Storage
 from services.store import Address, Store
 
@@ -54,11 +55,14 @@ class Home:
         self.measured = Measured(self.database)
         plan = plan_of_job(spec(OLD, BOTH, start="scratch"), SCENES)
         self.labels = [self.label(record.name, plan) for record in (OLD, BOTH)]
-        self.publish(train_task(plan, list(zip((OLD.digest, BOTH.digest), self.labels, strict=True)), None), "a")
+        self.publish(TRAIN.ask(plan, list(zip((OLD.digest, BOTH.digest), self.labels, strict=True)), None), "a")
 
     def label(self, name: str, plan: Plan) -> str:
-        params = {"budgets": [256], "tail": plan.tail, "g": plan.g, "metric": METRIC, "seed": plan.seed}
-        return self.put(Address("label", "v", (name,), params))
+        options = plan.options
+        params = LabelParams(
+            budgets=(256,), tail=options.tail, g=options.g, metric=METRIC, seed=options.seed, weights=options.weights
+        )
+        return self.put(Address("label", "v", (name,), params.model_dump(mode="json")))
 
     def put(self, address: Address) -> str:
         with self.store.put(address) as folder:
@@ -91,7 +95,7 @@ def test_an_alias_becomes_the_version_that_it_means_now(home: Home) -> None:
     assert accepted.spec == spec(start="glass@1.0.0")
     assert accepted.notes == ("The training begins with glass@1.0.0, and the network keeps its size, 4 units.",)
     before = home.plan(accepted.spec)
-    home.publish(train_task(before, [(NEW.digest, home.labels[0])], None), "b")
+    home.publish(TRAIN.ask(before, [(NEW.digest, home.labels[0])], None), "b")
     assert home.accept(spec(start="glass")).spec.start_from == "glass@1.1.0"
     assert home.plan(accepted.spec) == before, "a retry is the same training wherever the alias points"
 
@@ -109,10 +113,10 @@ def test_scenes_that_the_job_does_not_have_are_replayed(home: Home) -> None:
 def test_what_was_replayed_once_is_replayed_again_by_the_next(home: Home) -> None:
     plan = home.plan(spec())
     own = home.label("new", plan)
-    train = train_task(plan, [(NEW.digest, own)], plan.start)
+    train = TRAIN.ask(plan, [(NEW.digest, own)], plan.start)
     assert [shard.replayed for shard in trained_on(train.inputs)] == [False, True, True]
     assert [shard.artifact for shard in trained_on(train.inputs)] == list(train.needs) == [own, *home.labels]
-    assert train.artifact != train_task(home.plan(spec(replay=False)), [(NEW.digest, own)], plan.start).artifact
+    assert train.artifact != TRAIN.ask(home.plan(spec(replay=False)), [(NEW.digest, own)], plan.start).artifact
     home.publish(train, "b", "fresh", **{r.name: r.digest for r in (OLD, BOTH, NEW)})
     assert [artifact for _, artifact in home.plan(spec(UNSEEN, OLD, start="fresh")).replayed] == [own, home.labels[1]]
 
@@ -189,10 +193,10 @@ def test_a_job_of_before_has_the_addresses_of_before(home: Home) -> None:
     old = spec(start="champion", name="glass").model_dump(mode="json", exclude={"replay", "patience", "weights"})
     stored = JobSpec.model_validate(old)
     plan = home.plan(stored)
-    assert (plan.start, plan.replayed, plan.patience, plan.from_champion) == (None, (), 0, True)
-    train = train_task(plan, [(NEW.digest, home.labels[0])], None)
+    assert (plan.start, plan.replayed, plan.options.patience, plan.from_champion) == (None, (), 0, True)
+    train = TRAIN.ask(plan, [(NEW.digest, home.labels[0])], None)
     assert train.inputs == (f"{NEW.digest}:{home.labels[0].partition('/')[2]}",)
-    assert set(train.params) == {"seed", "steps", "network"}
+    assert (train.params["patience"], train.params["start"], train.params["replay"]) == (0, None, None)
 
 
 @pytest.mark.parametrize("kind", ["render", "label", "evaluate"])

@@ -20,47 +20,52 @@ from labeller.flip_weights import flip_weights
 from labeller.rules import allocate_curves
 from labeller.shards import read_shard
 from renderer.dump import write_dump
+from schemas.pixel_weights import PixelWeights
 from schemas.problem import Problem
 from schemas.tail import DEFAULT_TAIL
-from services.stages import label
 from services.stages.allocations import pixel_allocations, read_allocation
-from services.stages.desk import SHARD, load_facts
-from services.tasks import Facts, Task
+from services.stages.desk import SHARD
+from services.stages.label import LABEL, LabelFacts, LabelParams
+from services.stages.making import label
 
 DUMP = random_dump(20, 15, 9, seed=5)
 N = DUMP.total
-BUDGETS = [N // 2, 2 * N, N // 4, N // 2, N]
+BUDGETS = (N // 2, 2 * N, N // 4, N // 2, N)
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, LabelFacts]:
     return _made(tmp_path_factory)
 
 
-def _made(tmp_path_factory: pytest.TempPathFactory, **more: str) -> Path:
+@pytest.fixture(scope="module")
+def folder(made: tuple[Path, LabelFacts]) -> Path:
+    return made[0]
+
+
+def _made(tmp_path_factory: pytest.TempPathFactory, weights: PixelWeights = "none") -> tuple[Path, LabelFacts]:
     rendered, made = tmp_path_factory.mktemp("render"), tmp_path_factory.mktemp("label")
     write_dump(rendered, DUMP)
-    params = {"budgets": BUDGETS, "tail": DEFAULT_TAIL, "g": 0.75, "metric": "display", "seed": 3, **more}
-    task = Task(name="box front", stage="label", version="0", params=params)
+    params = LabelParams(budgets=BUDGETS, tail=DEFAULT_TAIL, g=0.75, metric="display", seed=3, weights=weights)
+    task = LABEL.task("box front", params, inputs=())
     desk = SimpleNamespace(artifact=lambda task, stage: rendered)
-    label.make(desk, task, made, lambda fraction, note: None)  # type: ignore[arg-type]
-    return made
+    return made, label.make(desk, task, params, made, lambda fraction, note: None)  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")
-def facts(folder: Path) -> Facts:
-    return load_facts(folder)
+def facts(made: tuple[Path, LabelFacts]) -> LabelFacts:
+    return made[1]
 
 
-def test_every_budget_has_an_answer_in_the_order_asked(facts: Facts) -> None:
+def test_every_budget_has_an_answer_in_the_order_asked(facts: LabelFacts) -> None:
     curves = error_curves(DUMP, DEFAULT_TAIL)
-    assert set(facts["errors"]) == set(RULES)
+    assert set(facts.errors) == set(RULES)
     for rule in RULES:
         expected = [found.error for found in allocate_curves(DUMP, curves, BUDGETS, rule)]
-        assert facts["errors"][rule] == pytest.approx(expected)
-    for budget, certificate in zip(BUDGETS, facts["certificates"], strict=True):
-        assert 0.0 <= certificate["bound"] <= certificate["error"]
-        assert (certificate["error"] == 0.0) == (budget >= N)
+        assert facts.errors[rule] == pytest.approx(tuple(expected))
+    for budget, certificate in zip(BUDGETS, facts.certificates, strict=True):
+        assert 0.0 <= certificate.bound <= certificate.error
+        assert (certificate.error == 0.0) == (budget >= N)
 
 
 def test_a_budget_is_allocated_once_and_one_that_holds_everything_never(folder: Path) -> None:
@@ -75,9 +80,10 @@ def test_a_budget_is_allocated_once_and_one_that_holds_everything_never(folder: 
         read_allocation(folder, "optimal", N)
 
 
-def test_what_took_no_part_is_counted(facts: Facts, folder: Path) -> None:
-    exact = facts["skips"].pop("pixels exact at k = 0")
-    assert facts["skips"] == {
+def test_what_took_no_part_is_counted(facts: LabelFacts, folder: Path) -> None:
+    skips = dict(facts.skips)
+    exact = skips.pop("pixels exact at k = 0")
+    assert skips == {
         "budgets that hold all fragments of a view": 2,
         "budgets given more than once": 1,
     }
@@ -86,24 +92,26 @@ def test_what_took_no_part_is_counted(facts: Facts, folder: Path) -> None:
     assert np.count_nonzero(vertices == 0) == pytest.approx(0.2 * exact, abs=6), "the rows are a fifth of the pixels"
 
 
-def test_the_shard_is_the_one_that_the_facts_name(facts: Facts, folder: Path) -> None:
+def test_the_shard_is_the_one_that_the_facts_name(facts: LabelFacts, folder: Path) -> None:
     shard = folder / SHARD
-    assert facts["shard"]["bytes"] == shard.stat().st_size
+    assert facts.shard.bytes == shard.stat().st_size
     assert read_shard(shard).meta.sampling.seed == 3
     assert [level.budget for level in read_shard(shard).meta.levels if level.scored] == [N // 4, N // 2]
 
 
 def test_the_image_of_the_label_role_has_all_that_every_kind_of_labels_needs() -> None:
     environment = {**os.environ, "PYTHONPATH": f"{BLOCKED}:{ROOT}", "BLOCKED_IMPORTS": ",".join(missing_from("label"))}
-    code = "import services.stages.label, sys; print('flip_evaluator' in sys.modules)"
+    code = "import services.stages.making.label, sys; print('flip_evaluator' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
     assert (done.stdout, done.stderr) == ("False\n", "")
 
 
-def test_weights_are_in_the_rows_alone(facts: Facts, folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
-    other = _made(tmp_path_factory, weights="flip")
-    assert load_facts(other)["errors"] == load_facts(folder)["errors"]
-    assert load_facts(other)["certificates"] == load_facts(folder)["certificates"]
+def test_weights_are_in_the_rows_alone(
+    facts: LabelFacts, folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    other, about = _made(tmp_path_factory, weights="flip")
+    assert about.errors == facts.errors
+    assert about.certificates == facts.certificates
     plain, weighted = read_shard(folder / SHARD), read_shard(other / SHARD)
     assert (plain.meta.weights, weighted.meta.weights) == ("none", "flip")
     assert np.array_equal(plain.pixel, weighted.pixel)

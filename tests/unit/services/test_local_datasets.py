@@ -14,6 +14,7 @@ from schemas.problem import Problem
 from schemas.view import View
 from services import local_datasets
 from services.local_datasets import write_dataset
+from services.stages.label import Shard
 
 CODE = "a" * 64
 
@@ -31,7 +32,7 @@ class Build:
             camera = View(name="/cam 1", eye=(0.0, 0.0, 5.0), target=(0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0))
             rendered = SimpleNamespace(view=camera)
             task = SimpleNamespace(artifact=label, version=CODE)
-            facts = {"shard": {"sha256": written.sha256, "bytes": written.bytes}}
+            facts = SimpleNamespace(shard=Shard(sha256=written.sha256, bytes=written.bytes))
             self.views.append(SimpleNamespace(scene=scene, rendered=rendered, task=task, facts=facts))
 
     def write(self, folder: Path, views: slice = slice(None)) -> None:

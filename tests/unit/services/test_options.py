@@ -9,20 +9,20 @@ from typing import Any
 import pytest
 
 from schemas.bundle import TailSpec
+from schemas.options import Options
 from schemas.problem import ExitCode, Problem
 from schemas.tail import TailName
+from services.flags import given, parse_size
 from services.options import (
     BuildOptions,
+    asked,
     check_budget,
     check_steepness,
     check_trained_tail,
     chosen_tail,
     default_holdout,
-    parse_budgets,
     parse_glass,
-    parse_size,
     parse_tail,
-    parse_weights,
 )
 
 
@@ -53,10 +53,11 @@ def test_a_tail_is_the_one_asked_for_else_the_bundle_s_else_the_usual_one(
 
 
 def test_a_bundle_is_made_only_for_a_tail_with_depth_bins(scenes: tuple[Path, ...]) -> None:
-    assert BuildOptions(scenes, "glass", tail="density-16").tail == "density-16"
-    for tail in ("density", "exact-coverage", "weighted-average", "paper"):
+    assert BuildOptions(scenes, "glass", Options(tail="density-16")).options.tail == "density-16"
+    unbinned: tuple[TailName, ...] = ("density", "exact-coverage", "weighted-average", "paper")
+    for tail in unbinned:
         with pytest.raises(Problem, match=f"cannot be made for the tail {tail}: it has no depth bins") as caught:
-            BuildOptions(scenes, "glass", tail=tail)
+            BuildOptions(scenes, "glass", Options(tail=tail))
         assert caught.value.remedy == "Use one of binned-8, binned-12, binned-16, density-16: --tail binned-12."
 
 
@@ -81,13 +82,13 @@ def test_a_steepness_beside_a_bundle_needs_the_tail_that_it_is_of() -> None:
     assert caught.value.remedy == "Leave out --g, or name the tail as well: --tail density --g 0.5."
 
 
-def test_budgets_are_sorted_and_unique(scenes: tuple[Path, ...]) -> None:
-    assert BuildOptions(scenes, "glass", budgets=(4.0, 1.0, 4.0)).budgets == (1.0, 4.0)
-    assert BuildOptions(scenes, "glass").budgets is None, "what is captured decides"
+def test_budgets_are_sorted_and_unique() -> None:
+    assert asked(Options, {"budgets": (4.0, 1.0, 4.0)}).budgets == (1.0, 4.0)
+    assert asked(Options, {}).budgets is None, "what is captured decides"
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("fields", "words"),
     [
         ({"budgets": ()}, "No budget"),
         ({"budgets": (0.0,)}, "A budget of 0 "),
@@ -96,20 +97,37 @@ def test_budgets_are_sorted_and_unique(scenes: tuple[Path, ...]) -> None:
         ({"budgets": (float("inf"),)}, "A budget of inf "),
         ({"budgets": (1e-9,)}, "A budget of 1e-09 is less than one fragment of a picture of 1430x960 pixels."),
         ({"budgets": tuple(float(i) for i in range(1, 18))}, "17 budgets are not possible."),
-        ({"alpha": 0.0}, "--alpha 0.0 is not between 0 and 1"),
-        ({"alpha": 1.0}, "--alpha 1.0 is not between 0 and 1"),
-        ({"alpha": float("nan")}, "--alpha nan"),
-        ({"width": 8}, "below 16 pixels"),
-        ({"width": 16000, "height": 16000}, "beyond 33177600 pixels"),
-        ({"width": 100000, "height": 16}, "beyond 16384 pixels a side"),
-        ({"views_per_scene": 0}, "--views-per-scene 0"),
-        ({"g": -1.0}, "--g -1.0"),
-        ({"g": float("nan")}, "--g nan"),
-        ({"seed": -1}, "--seed -1"),
+        ({"alpha": 0.0}, "--alpha 0 is not between 0 and 1 (both excluded)."),
+        ({"alpha": 1.0}, "--alpha 1 is not between 0 and 1"),
+        ({"alpha": float("nan")}, "--alpha nan is not between"),
+        ({"width": 8}, "--size 8x960 is not 16..16384."),
+        ({"width": 16000, "height": 16000}, "16000 x 16000 is more than 33177600 pixels."),
+        ({"width": 100000, "height": 16}, "--size 100000x16 is not 16..16384."),
+        ({"width": 0, "budgets": (1.0,)}, "--size 0x960 is not 16..16384."),
+        ({"views_per_scene": 0}, "--views-per-scene 0 is not 1..1000."),
+        ({"g": -1.0}, "--g -1 is not between 0 and 10."),
+        ({"g": float("nan")}, "--g nan is not between 0 and 10."),
+        ({"seed": -1}, "--seed -1 is not 0..2^53 - 1."),
+        ({"seed": 2**53}, "--seed 9007199254740992 is not 0..2^53 - 1."),
         ({"steps": 0}, "--steps 0 is not 1..1000000."),
-        ({"steps": -1}, "--steps -1 is not 1..1000000."),
         ({"steps": 10**12}, "--steps 1000000000000 is not 1..1000000."),
         ({"patience": -1}, "--patience -1 is not 0..1000000."),
+        ({"steps": 0, "patience": -1}, "--steps 0 is not 1..1000000. --patience -1 is not 0..1000000."),
+        ({"tail": "dense"}, "There is no tail 'dense'."),
+        ({"network": "huge"}, "There is no network 'huge'."),
+        ({"weights": "ssim"}, "There are no weights 'ssim'."),
+    ],
+)
+def test_options_out_of_range_are_problems(fields: dict[str, Any], words: str) -> None:
+    with pytest.raises(Problem) as caught:
+        asked(Options, fields)
+    assert words in caught.value.title
+    assert caught.value.remedy
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
         ({"start": ""}, "--from is empty."),
         ({"start": " "}, "--from is empty."),
         ({"replay": Path("datasets/glass")}, "--replay needs --from"),
@@ -118,7 +136,7 @@ def test_budgets_are_sorted_and_unique(scenes: tuple[Path, ...]) -> None:
         ({"views": Path("nowhere.json")}, "no views file nowhere.json"),
     ],
 )
-def test_options_out_of_range_are_problems(change: dict[str, Any], words: str, scenes: tuple[Path, ...]) -> None:
+def test_builds_that_cannot_be_are_problems(change: dict[str, Any], words: str, scenes: tuple[Path, ...]) -> None:
     with pytest.raises(Problem) as caught:
         BuildOptions(**{"scenes": scenes, "name": "glass", **change})
     assert words in caught.value.title
@@ -189,10 +207,10 @@ def test_a_quarter_is_held_out_by_default_whatever_the_order(scenes: tuple[Path,
 
 
 def test_texts_are_parsed__yes() -> None:
-    assert parse_budgets("1,2.5, 4") == (1.0, 2.5, 4.0)
+    texts = {"budgets": "4,2.5, 1", "size": "64x48", "seed": 7, "steps": None}
+    assert given(Options, texts) == {"budgets": (4.0, 2.5, 1.0), "width": 64, "height": 48, "seed": 7}
     assert parse_size("1430x960") == (1430, 960)
     assert parse_tail("paper") == "paper"
-    assert parse_weights("flip") == "flip"
     assert parse_glass("plain") == "plain"
 
 
@@ -203,11 +221,10 @@ def test_sizes_are_parsed__no(text: str) -> None:
 
 
 def test_other_texts_are_parsed__no() -> None:
-    with pytest.raises(Problem, match="not a list of numbers"):
-        parse_budgets("1;2")
+    with pytest.raises(Problem, match="--budgets '1;2' is not a list of numbers") as caught:
+        given(Options, {"budgets": "1;2"})
+    assert caught.value.remedy == "Write it like --budgets .5,1,2."
     with pytest.raises(Problem, match="no tail 'dense'"):
         parse_tail("dense")
     with pytest.raises(Problem, match="no reading of glass 'thick'"):
         parse_glass("thick")
-    with pytest.raises(Problem, match="no weights 'ssim'"):
-        parse_weights("ssim")

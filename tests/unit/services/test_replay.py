@@ -13,6 +13,7 @@ from support.shards import CODE, random_dataset
 
 from labeller.dataset import open_dataset
 from labeller.sampling import Sampling
+from schemas.options import Options
 from schemas.problem import Problem
 from schemas.view import View
 from services.local_datasets import write_dataset
@@ -20,6 +21,7 @@ from services.options import BuildOptions
 from services.plan import Plan, PlannedScene
 from services.progress import SilentProgress
 from services.replay import fine_tuning
+from services.stages.label import Shard
 from services.tasks import Source
 
 NO_REGISTRY: Any = None
@@ -44,7 +46,7 @@ def plan(options: BuildOptions) -> Plan:
         PlannedScene(label, Source(digest=f"digest of {label}"), held_out)
         for label, held_out in (("new", False), ("unseen", True))
     )
-    return Plan("fresh", scenes, (1.0,), None, 1, 64, 48, labels.tail, labels.g, 0, None)
+    return Plan("fresh", scenes, Options(budgets=(1.0,), width=64, height=48, tail=labels.tail, g=labels.g))
 
 
 @pytest.fixture
@@ -91,7 +93,7 @@ def test_a_held_out_scene_that_was_learned_is_refused(plan: Plan, options: Build
 @pytest.mark.parametrize("change", [{"tail": "exact-coverage"}, {"g": 0.5}, {"seed": 1}, {"weights": "flip"}])
 def test_labels_of_another_kind_are_refused(change: dict[str, Any], plan: Plan, options: BuildOptions) -> None:
     with pytest.raises(Problem, match="labelled otherwise") as caught:
-        fine_tuning(replace(plan, **change), options, NO_REGISTRY, Heard())
+        fine_tuning(plan.with_options(**change), options, NO_REGISTRY, Heard())
     assert "--replay" in caught.value.remedy
 
 
@@ -129,7 +131,7 @@ def test_the_new_data_set_holds_what_was_replayed_so_that_the_same_build_finds_i
         scene=SimpleNamespace(label="new", held_out=False, digest="digest of new"),
         rendered=SimpleNamespace(view=camera),
         task=SimpleNamespace(artifact="", version=CODE),
-        facts={"shard": {"sha256": written.sha256}},
+        facts=SimpleNamespace(shard=Shard(sha256=written.sha256, bytes=0)),
     )
     store: Any = SimpleNamespace(fetch=lambda artifact: tmp_path / "store")
     write_dataset(made, [view], store, replay)  # the folder of the old data set becomes that of the new one

@@ -12,15 +12,16 @@ import pytest
 from support.shards import random_shard
 
 from schemas.bundle import WEIGHTS
+from schemas.options import Options
 from schemas.problem import Problem
 from services.plan import Plan
-from services.stages import train
-from services.stages.desk import SHARD, Desk, load_facts
-from services.stages.tasks import train_task
+from services.stages.desk import SHARD, Desk
+from services.stages.making import train as training
+from services.stages.train import TRAIN
 from services.store import Address, Store
 from services.tasks import Task
 
-PLAN = Plan("glass", (), (1.0,), None, 1, 24, 24, "density", 0.75, 0, 4, "tiny")
+PLAN = Plan("glass", (), Options(budgets=(1.0,), width=24, height=24, tail="density", steps=4, network="tiny"))
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +42,7 @@ def labels(store: Store) -> list[str]:
 
 
 def task(labels: list[str]) -> Task:
-    return train_task(replace(PLAN, replayed=_pairs(labels[1:])), _pairs(labels[:1]), None)
+    return TRAIN.ask(replace(PLAN, replayed=_pairs(labels[1:])), _pairs(labels[:1]), None)
 
 
 def _pairs(labels: list[str]) -> tuple[tuple[str, str], ...]:
@@ -58,13 +59,15 @@ def test_shards_that_are_replayed_are_no_scenes_of_its_own(
         handed.append(([view.asset for view in views], [view.asset for view in replay]))
         return real(*arguments)
 
-    real = train.train
-    monkeypatch.setattr(train, "train", heard)
-    train.make(Desk(store, lambda source: Path()), task(labels), tmp_path, lambda fraction, note: None)
+    real = training.train
+    monkeypatch.setattr(training, "train", heard)
+    asked = task(labels)
+    desk = Desk(store, lambda source: Path())
+    facts = training.make(desk, asked, TRAIN.params_of(asked), tmp_path, lambda fraction, note: None)
     own, *replayed = (f"digest of {label}" for label in labels)
     assert handed == [([own], replayed)]
     assert (tmp_path / WEIGHTS).is_file()
-    assert load_facts(tmp_path)["history"]
+    assert facts.history
 
 
 def test_a_replayed_shard_that_is_damaged_is_named(store: Store, labels: list[str], tmp_path: Path) -> None:
@@ -76,5 +79,6 @@ def test_a_replayed_shard_that_is_damaged_is_named(store: Store, labels: list[st
     desk: Any = SimpleNamespace(
         store=SimpleNamespace(fetch=lambda label: copy if label == labels[2] else store.fetch(label))
     )
+    asked = task(labels)
     with pytest.raises(Problem, match="damaged"):
-        train.make(desk, task(labels), tmp_path, lambda fraction, note: None)
+        training.make(desk, asked, TRAIN.params_of(asked), tmp_path, lambda fraction, note: None)

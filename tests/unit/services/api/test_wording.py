@@ -71,7 +71,7 @@ def test_places_are_named_and_what_is_allowed_is_said(api: Api) -> None:
     assert said["body.budgets.0"] == "has to be a number"
     assert said["body.width"] == "has to be at least 16"
     assert said["body.secret"] == "is nothing that is known here"
-    assert document["detail"] == "'kind' in the body has to be 'build', 'render', 'label', 'train' or 'evaluate'."
+    assert document["detail"] == "'budgets.0' in the body has to be a number."
     whole = api.post("/v1/jobs", json={"kind": "build", "scenes": [{"scene": "scn_" + "0" * 32}]}).json()
     assert whole["detail"] == "The body: a build needs a name."
     assert api.post("/v1/jobs", json=[]).json()["detail"] == "The body has to be an object."

@@ -1,0 +1,31 @@
+"""Views of a scene, and what was found in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from renderer.usd.licence import authored_licence
+from renderer.views import placed_views, scene_views
+from services.stages.desk import Desk
+from services.stages.scene import SceneFacts, SceneParams
+from services.store import file_sha256
+from services.tasks import Report, Task
+
+
+def make(desk: Desk, task: Task, params: SceneParams, folder: Path, report: Report) -> SceneFacts:
+    """The facts of a scene: no file is written.
+
+    Raises:
+        Problem: The file is not a scene, or a listed view has no direction.
+    """
+    scene = desk.scene(task, params)
+    views = placed_views(params.views, scene) or scene_views(scene, params.count, params.seed)
+    report(1.0, f"{scene.triangles:,} triangles, {len(views)} views")
+    return SceneFacts(
+        views=tuple(views),
+        triangles=scene.triangles,
+        opaque=scene.is_opaque,
+        content=file_sha256(desk.scene_path(task)),
+        warnings=tuple(scene.warnings),
+        licence=authored_licence(desk.scene_path(task)),
+    )
