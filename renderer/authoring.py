@@ -34,6 +34,27 @@ class Image:
 
 
 @dataclass(frozen=True, slots=True)
+class GlassLook:
+    """How a material transmits light, as glTF says it.
+
+    Attributes:
+        transmission: How much of the light that is not reflected; the factor of the image's red where there is one.
+        image: Image of the transmission.
+        ior: Index of refraction.
+        attenuation: Linear RGB that white light becomes on its way through the volume.
+        distance: Length of that way, metres; 0: the volume takes nothing.
+        thickness: Of the volume beneath the surface, in the mesh's units; 0: it is a sheet.
+    """
+
+    transmission: float
+    image: Image | None = None
+    ior: float = 1.5
+    attenuation: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    distance: float = 0.0
+    thickness: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Look:
     """What is written of a material.
 

@@ -1,4 +1,4 @@
-"""Binary glTF (.glb) to USD: geometry, transforms, base colour and opacity, which is all that is rendered.
+"""Binary glTF (.glb) to USD: geometry, transforms, base colour, opacity and glass, which is all that is rendered.
 
 The same file makes the same bytes, whenever and wherever it is converted. This is the way of files that somebody else
 uploaded: what is read of them has passed `renderer.gate`, byte by byte, and no library parses them. Files of one's own,
@@ -11,6 +11,7 @@ import hashlib
 import shutil
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
-from renderer.authoring import COORDINATES, Geometry, Image, Look, write_material, write_mesh
+from renderer.authoring import COORDINATES, Geometry, GlassLook, Image, Look, write_material, write_mesh
+from renderer.authoring_glass import write_glass
 from renderer.gate.gltf import GlbContent, Object, damaged, floats, read_glb, walk_nodes
 from renderer.gate.images import PNG
+from renderer.gltf_materials import glass_of, left_out
+from renderer.usd.left_out import write_left_out
 from renderer.usd.licence import write_licence
 from schemas.scene import Wrap
 
-VERSION = "3"
+VERSION = "4"
 """Changes whenever the same file is converted to something else."""
 TRIANGLES, STRIP, FAN = 4, 5, 6
 WRAPS: dict[int, Wrap] = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
@@ -97,6 +101,7 @@ class _Converter:
         layer = Sdf.Layer.CreateAnonymous(".usdc")
         layer.TransferContent(self._stage.GetRootLayer())
         write_licence(layer, self._content.document.get("asset"))
+        write_left_out(layer, left_out(self._content.document))
         with Sdf.ChangeBlock():
             for number, matrix, mesh in placed:
                 _write_node(layer.GetPrimAtPath("/World"), f"Node{number}", matrix, mesh)
@@ -167,8 +172,19 @@ class _Converter:
             is_opaque=mode == "OPAQUE",
             cutoff=cutoff,
         )
-        self._materials[index] = write_material(self._stage, Sdf.Path(f"/World/Looks/{name}"), look)
+        path, glass = Sdf.Path(f"/World/Looks/{name}"), self._glass(material)
+        if glass is not None:
+            self._materials[index] = write_glass(self._stage, path, look, glass)
+        else:
+            self._materials[index] = write_material(self._stage, path, look)
         return self._materials[index]
+
+    def _glass(self, material: Object) -> GlassLook | None:
+        found = glass_of(self._content.name, material)
+        if found is None:
+            return None
+        glass, texture = found
+        return glass if texture is None else replace(glass, image=self._texture(texture))
 
     def _texture(self, reference: Any) -> Image:
         """A base colour texture and how it is sampled."""

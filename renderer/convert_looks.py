@@ -47,7 +47,7 @@ class Looks:
         """A glTF material."""
         base = _rgba(material.baseColorFactor)
         mode = material.alphaMode or "OPAQUE"
-        image = self._image(material.baseColorTexture) if has_uv and material.baseColorTexture is not None else None
+        image = self.image(material.baseColorTexture) if has_uv and material.baseColorTexture is not None else None
         cutoff = float(0.5 if material.alphaCutoff is None else material.alphaCutoff) if mode == "MASK" else None
         return Look(base=base, image=image, is_opaque=mode == "OPAQUE", cutoff=cutoff)
 
@@ -67,7 +67,7 @@ class Looks:
         mask = None
         if has_uv and "map_d" in given:
             mask = self._mask(" ".join(str(part) for part in given["map_d"]))
-        image = self._image(material.image) if has_uv and material.image is not None else None
+        image = self.image(material.image) if has_uv and material.image is not None else None
         if image is not None and "kd" not in given:
             red = green = blue = 1.0
         alpha = min(max(alpha, 0.0), 1.0)
@@ -79,13 +79,13 @@ class Looks:
         path = self._source / name.replace("\\", "/")
         try:
             with PillowImage.open(path) as image:
-                return self._image(image), "a" if image.mode in ("RGBA", "LA", "PA") else "r"
+                return self.image(image), "a" if image.mode in ("RGBA", "LA", "PA") else "r"
         except OSError:
             self._warn(f"the opacity image {name} cannot be read, and is left out")
             return None
 
-    def _image(self, image: Any) -> Image:
-        """Writes an image once."""
+    def image(self, image: Any) -> Image:
+        """Writes a Pillow image once."""
         kept = image if image.mode in ("L", "LA", "RGB", "RGBA") else image.convert("RGBA")
         key = kept.mode.encode() + struct.pack("<II", *kept.size) + kept.tobytes()
         if key not in self._images:

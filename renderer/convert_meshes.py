@@ -9,11 +9,10 @@ both. Colours of materials are linear, and so are glTF's vertex colours; those o
 
 from __future__ import annotations
 
-import json
 import re
-import struct
 import tempfile
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -21,12 +20,16 @@ from urllib.parse import unquote
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from PIL import Image as PillowImage
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdUtils, Vt
 from trimesh.resolvers import FilePathResolver
 
-from renderer.authoring import COORDINATES, Geometry, Look, vectors, write_material, write_mesh
+from renderer.authoring import COORDINATES, Geometry, GlassLook, Look, vectors, write_material, write_mesh
+from renderer.authoring_glass import write_glass
 from renderer.convert_looks import Looks, is_invented
+from renderer.gltf_materials import document_of, glass_of, image_bytes, left_out, numbered, transmits
 from renderer.usd.assemble import FARTHEST
+from renderer.usd.left_out import write_left_out
 from renderer.usd.licence import write_licence
 from schemas.colour import srgb_to_linear
 from schemas.problem import ExitCode, Problem
@@ -121,8 +124,12 @@ def _read(source: Path) -> trimesh.Scene:
         wanted: dict[str, Any] = {"process": False, **_READING.get(source.suffix.lower(), {})}
         # Textures of an OBJ are often beside its folder; glTF comes as one folder.
         resolver = FilePathResolver(str(source), allow_anywhere=source.suffix.lower() not in _GLTF)
-        scene: trimesh.Scene = trimesh.load_scene(source, resolver=resolver, **wanted)
-        needed = _gltf_json(source).get("extensionsRequired", []) if source.suffix.lower() in _GLTF else []
+        document = document_of(source.read_bytes()) if source.suffix.lower() in _GLTF else {}
+        needed = document.get("extensionsRequired", [])
+        given: Any = source
+        if transmits(document):
+            given, wanted["file_type"] = BytesIO(numbered(source.read_bytes())), source.suffix.lower()[1:]
+        scene: trimesh.Scene = trimesh.load_scene(given, resolver=resolver, **wanted)
     except Exception as error:  # every reader has its own kinds
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise Problem(f"{source} cannot be read ({reason[:200]}).", "Export it again.") from error
@@ -163,11 +170,14 @@ class _Writer:
     textures: str
     folder: Path
     _stage: Usd.Stage = field(default_factory=Usd.Stage.CreateInMemory)
-    _materials: dict[Look, UsdShade.Material] = field(default_factory=dict)
+    _materials: dict[tuple[Look, GlassLook | None], UsdShade.Material] = field(default_factory=dict)
     _warnings: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._looks = Looks(self.source.parent, self.folder, self.textures, self._warn)
+        is_gltf = self.source.suffix.lower() in _GLTF
+        self._document = document_of(self.source.read_bytes()) if is_gltf else {}
+        self._is_numbered = transmits(self._document)
 
     def write(self, path: Path, up: str, metres_per_unit: float) -> Converted:
         """Writes the stage and the images."""
@@ -179,7 +189,9 @@ class _Writer:
             self._geometry(name, stands)
         self._name_what_is_left_out()
         if self.source.suffix.lower() in _GLTF:
-            write_licence(self._stage.GetRootLayer(), _gltf_json(self.source).get("asset"))
+            write_licence(self._stage.GetRootLayer(), self._document.get("asset"))
+        warnings = tuple(f"{text} ({count}x)" if count > 1 else text for text, count in self._warnings.items())
+        write_left_out(self._stage.GetRootLayer(), warnings)
         self._stage.GetRootLayer().Export(str(path))
         return Converted(
             meshes=len(places),
@@ -189,7 +201,7 @@ class _Writer:
             textures=self._looks.images,
             up=up,
             metres_per_unit=metres_per_unit,
-            warnings=tuple(f"{text} ({count}x)" if count > 1 else text for text, count in self._warnings.items()),
+            warnings=warnings,
         )
 
     def _warn(self, text: str) -> None:
@@ -281,11 +293,35 @@ class _Writer:
 
     def _material(self, material: Any, has_uv: bool) -> UsdShade.Material:
         look = self._looks.look_of(material, has_uv)
-        if look not in self._materials:
+        number, colon, name = str(getattr(material, "name", None) or "").partition(":")
+        is_numbered = bool(colon) and self._is_numbered
+        glass = self._glass(int(number), has_uv) if is_numbered else None
+        if (look, glass) not in self._materials:
             self._stage.DefinePrim("/World/Looks", "Scope")
-            path = self._free(Sdf.Path("/World/Looks"), str(getattr(material, "name", None) or "Material"))
-            self._materials[look] = write_material(self._stage, path, look)
-        return self._materials[look]
+            named = (name if is_numbered else number + colon + name) or "Material"
+            path = self._free(Sdf.Path("/World/Looks"), named)
+            if glass is None:
+                made = write_material(self._stage, path, look)
+            else:
+                made = write_glass(self._stage, path, look, glass)
+            self._materials[look, glass] = made
+        return self._materials[look, glass]
+
+    def _glass(self, index: int, has_uv: bool) -> GlassLook | None:
+        """How the material of a glTF file with that index transmits light."""
+        found = glass_of(self.source.name, self._document["materials"][index])
+        if found is None:
+            return None
+        glass, texture = found
+        if not has_uv or not isinstance(texture, dict):
+            return glass
+        try:
+            data = image_bytes(self.source.read_bytes(), self.source.parent, texture["index"])
+            with PillowImage.open(BytesIO(data)) as image:
+                return replace(glass, image=self._looks.image(image))
+        except (OSError, LookupError, TypeError, ValueError):
+            self._warn("an image of the transmission cannot be read, and is left out")
+            return glass
 
     def _name_what_is_left_out(self) -> None:
         if self.source.suffix.lower() == ".obj":
@@ -297,20 +333,13 @@ class _Writer:
                     self._warn(f"the image {image} is missing, and left out")
         if self.source.suffix.lower() not in _GLTF:
             return
-        document = _gltf_json(self.source)
+        document = self._document
         for image in document.get("images", []):
             uri = str(image.get("uri", "data:"))
             if not uri.startswith("data:") and not _is_beneath(self.source.parent, unquote(uri)):
                 self._warn(f"the image {uri} is missing, or outside of the file's folder")
-        if document.get("animations"):
-            self._warn("animations are left out: the scene is as at rest")
-        if document.get("skins"):
-            self._warn("skins are left out: the meshes keep their bind pose")
-        if document.get("cameras"):
-            self._warn("cameras are left out")
-        found = json.dumps(document.get("materials", []))
-        for extension in sorted(set(re.findall(r'"(KHR_[a-z_]+)"', found))):
-            self._warn(f"{extension} is left out")
+        for text in left_out(document):
+            self._warn(text)
         if any(set(sampler) & {"wrapS", "wrapT"} for sampler in document.get("samplers", [])):
             self._warn("textures repeat, whatever their samplers say")
 
@@ -327,12 +356,3 @@ def _missing_images(library: Path) -> list[str]:
     # Before the name there may be options.
     found = [name.decode(errors="replace").replace("\\", "/") for name in names]
     return [name for name in found if not any((library.parent / n).is_file() for n in (name, name.split()[-1]))]
-
-
-def _gltf_json(source: Path) -> dict[str, Any]:
-    """The JSON of a file that trimesh has read."""
-    data = source.read_bytes()
-    if data[:4] == b"glTF":
-        data = data[20 : 20 + struct.unpack_from("<I", data, 12)[0]]
-    document: dict[str, Any] = json.loads(data)
-    return document

@@ -109,6 +109,8 @@ class GpuScene:
             set_uniforms(program, uniforms)
             if not batch.is_plain:
                 self._bind(program, batch)
+            if batch.reflectance is not None:
+                set_uniforms(program, _glass(batch))
             for first, triangles in runs:
                 if ranked:
                     set_uniforms(program, {"first_triangle": first})
@@ -153,6 +155,16 @@ class GpuScene:
         set_uniforms(program, uniforms)
 
 
+def _glass(batch: Batch) -> dict[str, object]:
+    """Uniforms of `common/glass.glsl`."""
+    return {
+        "reflectance": batch.reflectance,
+        "transmittance": -1.0 if batch.transmittance is None else batch.transmittance,
+        "presence": batch.presence,
+        "has_presence_texture": batch.has_presence_texture,
+    }
+
+
 def surface_defines(batch: Batch, textures: tuple[Texture, ...]) -> dict[str, int]:
     """What of `common/surface.glsl` a batch needs, as defines of 0 or 1."""
     wraps = {wrap for index in batch.textures for wrap in textures[index].wrap}
@@ -162,6 +174,7 @@ def surface_defines(batch: Batch, textures: tuple[Texture, ...]) -> dict[str, in
         "WRAPPED": int(any(_WRAP_CODES[wrap] for wrap in wraps)),
         "MORE_UVS": int(max(batch.colour_uv, batch.opacity_uv, batch.emission_uv) > 0),
         "EMISSIVE": int(batch.emission_texture >= 0),
+        "GLASS": int(batch.reflectance is not None),
     }
 
 

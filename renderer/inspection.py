@@ -16,10 +16,11 @@ from renderer.scene_report import CameraFact, Kind, MaterialFact, PrimCount, Sce
 from renderer.timecodes import is_animated
 from renderer.usd.cameras import read_cameras
 from renderer.usd.digest import dependencies
+from renderer.usd.drivers import Driver
 from renderer.usd.instances import DRAWN_PURPOSES, Draw
 from renderer.usd.parts import Part
 from renderer.usd.stage import WarningLog, canonical_path, open_stage, stage_time, usd_diagnostics, usd_reason
-from renderer.usd.surfaces import Surface
+from renderer.usd.surfaces import Glass, Surface
 from schemas.problem import Problem
 from schemas.scene import SceneArrays
 
@@ -211,22 +212,54 @@ class _Census:
 
 
 def _kind(part: Part) -> Kind:
-    if part.style.opacity_threshold > 0.0 and part.style.cut_out_alpha >= 1.0:
+    if part.style.opacity_threshold > 0.0 and part.style.cut_out_alpha >= 1.0 and part.surface.glass is None:
         return "cut-out"
     return "opaque" if part.style.layer == "opaque" else "transparent"
 
 
 def _why(surface: Surface, alpha: float | None) -> str:
-    opacity = surface.opacity
-    if opacity.sampler is not None:
-        text = f"opacity from {opacity.sampler.file.name}, channel {'rgba'[opacity.number_channel]}"
-    elif opacity.primvar is not None:
-        text = f"opacity from primvar {opacity.primvar}"
-    else:
-        text = f"opacity {opacity.number_bias:g}"
+    if surface.glass is not None:
+        return _why_glass(surface, surface.glass)
+    text = f"opacity {_source(surface.opacity)}"
     if surface.threshold > 0.0:
         text += f", cut out below {surface.threshold:g}"
     return text if alpha is None else f"every surface has alpha {alpha:g}; as authored: {text}"
+
+
+def _why_glass(surface: Surface, glass: Glass) -> str:
+    low, high = (_short(1.0 - (1.0 - mirrored) * _let_through(surface, glass)) for mirrored in glass.reflectance)
+    text = f"glass: {glass.said}, drawn with Fresnel alpha {low} to {high}"
+    if not surface.colour.is_constant:
+        text += " and a tint that varies"
+    elif glass.transmittance is None and min(surface.colour.rgb) < 1.0:
+        text += f" and tint {' '.join(_short(x) for x in surface.colour.rgb)}"
+    if glass.has_presence:
+        text += f", opacity {_source(surface.opacity)}"
+    elif glass.presence < 1.0:
+        text += f", times opacity {glass.presence:g}"
+    return text + (f", cut out below {surface.threshold:g}" if surface.threshold > 0.0 else "")
+
+
+def _let_through(surface: Surface, glass: Glass) -> float:
+    """Fraction of the light that is not reflected and goes through; at most, where it varies."""
+    tint = glass.transmittance
+    if tint is None:
+        tint = sum(surface.colour.rgb) / 3.0 if surface.colour.is_constant else 1.0
+    if glass.has_presence:
+        return tint * (1.0 - glass.body)
+    return tint * (1.0 - surface.opacity.number_bias if surface.opacity.is_constant else 1.0)
+
+
+def _short(value: float) -> str:
+    """A number in [0,1] to two digits, without the zero before its point."""
+    text = f"{value:.2g}"
+    return text[1:] if text.startswith("0.") else text
+
+
+def _source(opacity: Driver) -> str:
+    if opacity.sampler is not None:
+        return f"from {opacity.sampler.file.name}, channel {'rgba'[opacity.number_channel]}"
+    return f"from primvar {opacity.primvar}" if opacity.primvar is not None else f"{opacity.number_bias:g}"
 
 
 def _add_finds(report: SceneReport, finds: _Finds) -> None:

@@ -17,6 +17,7 @@ from renderer.usd.cameras import read_cameras
 from renderer.usd.digest import scene_digest
 from renderer.usd.geometry import read_shape
 from renderer.usd.instances import Draw, Walker, product
+from renderer.usd.left_out import log_left_out
 from renderer.usd.materials import MaterialTable
 from renderer.usd.parts import Part, build_parts
 from renderer.usd.shape import Reading
@@ -30,6 +31,7 @@ from renderer.usd.stage import (
     used_layers,
 )
 from renderer.usd.textures import TextureTable
+from schemas.glass import DEFAULT_GLASS, GlassReading
 from schemas.problem import ExitCode, Problem
 from schemas.scene import SceneArrays
 
@@ -57,7 +59,8 @@ class LoadOptions:
 
     Attributes:
         alpha: Opacity in (0,1] of every surface, instead of its own; cut-outs keep their shape, a texture's opacity
-            without a threshold is multiplied. None: as authored.
+            without a threshold is multiplied; nothing is glass then. None: as authored.
+        glass: How surfaces that transmit light are read.
         time: Time code to read at; None: the start of the stage's range.
         variants: Selections `set=choice` (every prim that has the set) or `/prim/path:set=choice`.
         refine: Levels of subdivision of meshes that have a scheme, 0 to MAX_REFINE; 0: their cages, as `usdrecord
@@ -66,6 +69,7 @@ class LoadOptions:
     """
 
     alpha: float | None = None
+    glass: GlassReading = DEFAULT_GLASS
     time: float | None = None
     variants: tuple[str, ...] = ()
     refine: int = 0
@@ -100,6 +104,7 @@ def load_scene(path: Path, options: LoadOptions = LoadOptions(), watch: Watch | 
             # Whatever is looked up while it is read is looked up as the stage does it.
             with Ar.ResolverContextBinder(stage.GetPathResolverContext()):
                 scene = _StageReader(stage, path, options, log, watch).read()
+            log_left_out(stage.GetRootLayer(), log)
             used_layers(stage, options.home and options.home.resolve())
     except (Tf.ErrorException, UnicodeDecodeError) as error:
         # Also a damaged file's strings can have bytes that are no text.
@@ -128,7 +133,8 @@ class _StageReader:
         self._refine = options.refine
         self._time = stage_time(stage, options.time)
         self._textures = TextureTable(options.home and options.home.resolve())
-        self._materials = MaterialTable(self._time, self._textures, log)
+        glass = options.glass if options.alpha is None else "plain"
+        self._materials = MaterialTable(self._time, self._textures, log, glass)
         self._metres = metres_per_unit(stage, log)
 
     def read(self) -> SceneArrays:

@@ -136,7 +136,8 @@ class ParityReport(BaseModel):
         torch_onnx: torch against onnxruntime.
         torch_glsl: torch against `predict.glsl` run by the driver below.
         torch_ubo: torch against `predict_ubo.glsl`.
-        half_tolerance: What was allowed with weights in float16 and arithmetic in float32: half a rank of a log gain of 16.
+        half_tolerance: What was allowed with weights in float16 and arithmetic in float32; of a log gain of 16, half a
+            rank.
         half: The files of which that is true, run by the driver below -> difference.
         float16: With hidden layers computed in float16 too, every product and sum rounded. Relative to the scale of the
             output, the largest |value| that it takes on these inputs, or 1: float16 has 11 bits, and the terms whose

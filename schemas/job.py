@@ -6,6 +6,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
+from schemas.glass import DEFAULT_GLASS, GlassReading
 from schemas.licence import MOST_CHARACTERS
 from schemas.limits import LIMITS
 from schemas.network import DEFAULT_NETWORK, NetworkSize
@@ -82,6 +83,7 @@ class JobSpec(BaseModel):
         budgets: Fragments of a frame as multiples of width * height; None: what the captured views call for, between
             0.05 and 4 times width * height.
         alpha: Opacity in (0, 1) that every surface gets; None keeps the materials' own.
+        glass: How surfaces that transmit light are read (`schemas.glass`).
         views_per_scene: How many views are sampled of a scene without cameras of its own.
         width: Pixels per row.
         height: Rows.
@@ -119,6 +121,7 @@ class JobSpec(BaseModel):
         | None
     ) = None
     alpha: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
+    glass: GlassReading = DEFAULT_GLASS
     views_per_scene: int = Field(default=3, ge=1, le=LIMITS.views)
     width: int = Field(default=1430, ge=LIMITS.min_side, le=LIMITS.max_side)
     height: int = Field(default=960, ge=LIMITS.min_side, le=LIMITS.max_side)

@@ -6,6 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from schemas.glass import DEFAULT_GLASS, GlassReading
 from schemas.tail import TailName
 from schemas.view import View
 
@@ -30,6 +31,7 @@ class Measurement(_Record):
         width: Pixels per row.
         height: Rows.
         alpha: Opacity that every surface was given; None: the materials' own.
+        glass: How surfaces that transmit light were read.
         tail: How the fragments beyond k are averaged.
         mse: Mean over RGB of the squared difference of sRGB values in [0,1], whole picture. Shown times 1e5.
         mse_occupied: The same over pixels with at least one transparent fragment.
@@ -59,6 +61,7 @@ class Measurement(_Record):
     width: int = Field(gt=0)
     height: int = Field(gt=0)
     alpha: float | None
+    glass: GlassReading = DEFAULT_GLASS
     tail: TailName
     mse: float | None = Field(default=None, ge=0.0)
     mse_occupied: float | None = Field(default=None, ge=0.0)

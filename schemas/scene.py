@@ -41,7 +41,7 @@ class Batch:
     Attributes:
         first: First index (into `SceneArrays.indices`).
         count: Number of indices, a multiple of 3.
-        layer: `opaque`: every fragment is opaque. `transparent`: every fragment has the vertex alpha < 1.
+        layer: `opaque`: every fragment is opaque. `transparent`: every fragment has the vertex alpha < 1, or is glass.
             `mixed`: opacity varies; a fragment of stored alpha 255 is opaque, of 0 is nothing.
         colour_texture: Index into `SceneArrays.textures`, or -1.
         colour_scale: float RGBA factor on the sampled colour (UsdUVTexture `scale`).
@@ -60,6 +60,12 @@ class Batch:
         emission_scale: float RGBA factor on the sampled emission.
         emission_bias: float RGBA offset on the sampled emission.
         emission_uv: As `colour_uv`.
+        reflectance: Of glass (docs/METHOD.md, section 1), what it reflects facing the eye and at a silhouette, each in
+            [0,1]; None: it is no glass. Of glass the colour is the tint of what goes through, and the vertex alpha,
+            times the opacity texture, the share of light that is not transmitted.
+        transmittance: Of glass whose colour is not its tint, the mean of the tint; None: it is that of the colour.
+        presence: Of glass, the opacity that multiplies all that; a threshold applies to it.
+        has_presence_texture: Whether the opacity texture gives the presence instead.
     """
 
     first: int
@@ -80,6 +86,10 @@ class Batch:
     emission_scale: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
     emission_bias: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     emission_uv: int = 0
+    reflectance: tuple[float, float] | None = None
+    transmittance: float | None = None
+    presence: float = 1.0
+    has_presence_texture: bool = False
 
     @property
     def textures(self) -> tuple[int, ...]:

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from schemas.bundle import load_manifest
+from schemas.glass import DEFAULT_GLASS
 from schemas.licence import verdict
 from schemas.network import DEFAULT_NETWORK
 from schemas.pixel_weights import DEFAULT_WEIGHTS
@@ -83,6 +84,7 @@ def command_line(options: BuildOptions) -> str:
         parts += ["--budgets", ",".join(f"{budget:g}" for budget in options.budgets)]
     parts += ["--name", options.name, "--size", f"{options.width}x{options.height}"]
     parts += ["--alpha", f"{options.alpha:g}"] if options.alpha is not None else []
+    parts += ["--glass", options.glass] if options.glass != DEFAULT_GLASS else []
     for scene in options.holdout:
         parts += ["--holdout", str(scene)]
     for scene, licence in options.licences.items():

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePath
 
 from schemas.bundle import Manifest
+from schemas.glass import DEFAULT_GLASS
 from schemas.licence import commercial_use, verdict
 from schemas.measurement import Measurement
 from schemas.network import DEFAULT_NETWORK
@@ -70,6 +71,7 @@ def command_of(plan: Plan) -> str:
     parts += ["--budgets", ",".join(f"{factor:g}" for factor in plan.factors)]
     parts += ["--size", f"{plan.width}x{plan.height}", "--views-per-scene", str(plan.views_per_scene)]
     parts += ["--alpha", f"{plan.alpha:g}"] if plan.alpha is not None else []
+    parts += ["--glass", plan.glass] if plan.glass != DEFAULT_GLASS else []
     parts += ["--tail", plan.tail, "--seed", str(plan.seed)]
     parts += ["--steps", str(plan.steps)] if plan.steps is not None else []
     parts += ["--network", plan.network] if plan.network != DEFAULT_NETWORK else []

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from schemas.bundle import TailSpec
+from schemas.glass import DEFAULT_GLASS, GLASS_READINGS, GlassReading
 from schemas.licence import tidy
 from schemas.limits import LIMITS
 from schemas.network import DEFAULT_NETWORK, SIZES, NetworkSize
@@ -41,6 +42,7 @@ class BuildOptions:
         holdout: Those of `scenes` that are evaluated on and never trained on. Empty: chosen by `default_holdout`.
         licences: Scene -> its licence and whom to name for it, instead of what its stage states.
         alpha: Opacity in (0, 1) that every surface gets; None keeps the materials' own.
+        glass: How surfaces that transmit light are read.
         views: JSON file with views; None: the stage's cameras, else sampled ones.
         views_per_scene: How many views are sampled of a scene without cameras of its own.
         width: Pixels per row.
@@ -67,6 +69,7 @@ class BuildOptions:
     holdout: tuple[Path, ...] = ()
     licences: Mapping[Path, str] = field(default_factory=dict)
     alpha: float | None = None
+    glass: GlassReading = DEFAULT_GLASS
     views: Path | None = None
     views_per_scene: int = 3
     width: int = 1430
@@ -308,6 +311,15 @@ def parse_network(text: str) -> NetworkSize:
         Problem: There is none.
     """
     return _named(text, SIZES, "There is no network", f"--network {DEFAULT_NETWORK}")
+
+
+def parse_glass(text: str) -> GlassReading:
+    """The reading of glass of that name.
+
+    Raises:
+        Problem: There is none.
+    """
+    return _named(text, GLASS_READINGS, "There is no reading of glass", f"--glass {DEFAULT_GLASS}")
 
 
 def parse_weights(text: str) -> PixelWeights:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from schemas.glass import DEFAULT_GLASS, GlassReading
 from schemas.job import JobSpec
 from schemas.network import DEFAULT_NETWORK, NetworkSize
 from schemas.pixel_weights import DEFAULT_WEIGHTS, PixelWeights
@@ -46,6 +47,7 @@ class Plan:
         factors: Budgets as multiples of width * height, ascending; empty until `services.budgets.decided` where none
             were given.
         alpha: Opacity that every surface gets; None keeps the materials' own.
+        glass: How surfaces that transmit light are read.
         views_per_scene: How many views are sampled of a scene without cameras.
         width: Pixels per row.
         height: Rows.
@@ -82,6 +84,7 @@ class Plan:
     promote: bool = True
     patience: int = 0
     weights: PixelWeights = DEFAULT_WEIGHTS
+    glass: GlassReading = DEFAULT_GLASS
     start: Source | None = None
     replay: Source | None = None
     replayed: tuple[tuple[str, str], ...] = ()
@@ -110,6 +113,7 @@ class Plan:
             "tail": self.tail,
             "g": self.g,
             "seed": self.seed,
+            **({"glass": self.glass} if self.glass != DEFAULT_GLASS else {}),
             **({"weights": self.weights} if self.weights != DEFAULT_WEIGHTS else {}),
         }
 
@@ -124,6 +128,7 @@ class Plan:
             factors=tuple(settings["budgets"]),
             tail=settings["tail"],
             g=settings["g"],
+            glass=settings.get("glass", DEFAULT_GLASS),
             weights=settings.get("weights", DEFAULT_WEIGHTS),
         )
 
@@ -160,6 +165,7 @@ def plan_of_build(options: BuildOptions) -> Plan:
         network=options.network,
         patience=options.patience,
         weights=options.weights,
+        glass=options.glass,
     )
 
 
@@ -192,6 +198,7 @@ def plan_of_job(spec: JobSpec, scenes: Mapping[str, SceneRecord]) -> Plan:
         network=spec.network,
         patience=spec.patience,
         weights=spec.weights,
+        glass=spec.glass,
         from_champion=spec.start_from == "champion",
         promote=spec.promote == "if-better",
         is_scored=spec.kind == "build",

@@ -28,6 +28,7 @@ from services.local_scenes import Chosen, LocalScene, as_usd
 from services.options import ChosenTail, check_budget, check_trained_tail, chosen_tail
 from services.progress import Progress
 from services.render_options import RenderOptions
+from services.scene_warnings import said_warnings
 from services.stages.pictures import write_png
 from services.writing import replacing
 
@@ -157,10 +158,9 @@ def _scene(
                 raise
             progress.note(f"warning: frame {time:g} is left out. {problem.title}")
             continue
-        for warning in warnings:
-            if warning not in told:
-                progress.note(f"warning: {scene.file}: {warning}")
-                told.add(warning)
+        for line in said_warnings(scene.file, [line for line in warnings if line not in told], scene.file):
+            progress.note(line)
+        told.update(warnings)
         frame = scene.start if time is None else None if math.isnan(time) else time
         for chosen in scene.views(options.camera, options.views):
             job = _Job(scene, chosen, frame, size_of(options, chosen.aspect), tail)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import PurePath
 
 from schemas.measurement import Certificate, Measurement, TrainingPoint
 from schemas.problem import ExitCode, Problem
@@ -10,6 +11,7 @@ from schemas.skips import OPAQUE_SCENES, OPAQUE_VIEWS
 from schemas.view import View
 from services.plan import Plan, PlannedScene
 from services.records import Bundle, EvaluatedView, LabelledView, RenderedView, SceneEntry
+from services.scene_warnings import said_warnings
 from services.stages import tasks
 from services.tasks import Facts, Runner, Source, StageName, Task
 
@@ -23,6 +25,11 @@ def read_scenes(plan: Plan, runner: Runner) -> tuple[SceneEntry, ...]:
     asked = [tasks.scene_task(plan, scene) for scene in plan.scenes]
     made = _map(runner, "scene", asked)
     entries = [_entry(scene, facts) for scene, facts in zip(plan.scenes, made, strict=True) if facts is not None]
+    for entry in entries:
+        source = entry.source
+        file = None if source.folder is None else PurePath(source.folder, source.root)
+        for line in said_warnings(entry.label, entry.warnings, file):
+            runner.progress.note(line)
     _refuse_copies(entries)
     return _transparent(runner, entries)
 

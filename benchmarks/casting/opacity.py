@@ -60,6 +60,12 @@ def classify(scene: SceneArrays, hits: Hits) -> Kinds:
     for batch in scene.batches:
         first = batch.first // 3
         rows = np.flatnonzero((hits.triangle >= first) & (hits.triangle < first + batch.count // 3))
+        if batch.reflectance is not None:
+            presence, body = _glass(scene, batch, hits, rows)
+            solid = _Range(*(getattr(presence, end) * getattr(body, end) for end in ("low", "high", "middle")))
+            possible[rows] = _bits_of_glass(presence.low, presence.high, solid.low, solid.high)
+            likely[rows] = _bits_of_glass(presence.middle, presence.middle, solid.middle, solid.middle)
+            continue
         alpha = _alpha(scene, batch, hits, rows)
         possible[rows] = _bits(batch, 255.0 * alpha.low, 255.0 * alpha.high)
         likely[rows] = _bits(batch, 255.0 * alpha.middle, 255.0 * alpha.middle)
@@ -76,6 +82,35 @@ def _bits(batch: Batch, low: Floats, high: Floats) -> NDArray[np.uint8]:
         return np.asarray(solid | NOTHING * (low < 254.5), dtype=np.uint8)
     between = TRANSPARENT * ((high >= 0.5) & (low < 254.5))
     return np.asarray(solid | between | NOTHING * (low < 0.5), dtype=np.uint8)
+
+
+def _bits_of_glass(low: Floats, high: Floats, least_solid: Floats, most_solid: Floats) -> NDArray[np.uint8]:
+    """What a fragment of glass is (`renderer.reference.glass`): transparent, whatever it reflects, where there is any.
+
+    Args:
+        low: Least presence, 0..1.
+        high: Greatest.
+        least_solid: Least product of presence and the share of light that is not transmitted.
+        most_solid: Greatest.
+    """
+    between = TRANSPARENT * ((255.0 * high >= 0.5) & (255.0 * least_solid < 254.5))
+    opaque = OPAQUE * (255.0 * most_solid >= 254.5)
+    return np.asarray(between | opaque | NOTHING * (255.0 * low < 0.5), dtype=np.uint8)
+
+
+def _glass(scene: SceneArrays, batch: Batch, hits: Hits, rows: NDArray[np.int64]) -> tuple[_Range, _Range]:
+    """Presence of glass, and the share of light that it does not transmit, as ranges."""
+    body = _corner_alpha(scene, hits, rows)
+    presence = _Range(*(np.full(len(rows), batch.presence) for _ in range(3)))
+    if batch.opacity_texture < 0:
+        return presence, body
+    found = _sampled(scene, batch, hits, rows)
+    if not batch.has_presence_texture:
+        return presence, _Range(body.low * found.low, body.high * found.high, body.middle * found.middle)
+    if batch.opacity_threshold > 0.0:
+        kept = ((end >= batch.opacity_threshold).astype(np.float64) for end in (found.low, found.high, found.middle))
+        return _Range(*kept), body
+    return _Range(*(batch.presence * end for end in (found.low, found.high, found.middle))), body
 
 
 def _alpha(scene: SceneArrays, batch: Batch, hits: Hits, rows: NDArray[np.int64]) -> _Range:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -11,7 +12,7 @@ from pxr import Usd, UsdGeom
 from renderer.usd.drivers import Driver, Sampler, Vec3, number
 from renderer.usd.materials import MaterialTable
 from renderer.usd.shape import Shape
-from renderer.usd.surfaces import Surface
+from renderer.usd.surfaces import Glass, Surface
 from renderer.usd.topology import Attribute, Domain
 from schemas.colour import encode_gamma2
 
@@ -31,6 +32,7 @@ class SurfaceAttributes:
     Attributes:
         opacity: What drives the opacity; without a texture that is the same everywhere.
         threshold: Of a cut-out whose fragments must be tested; else 0.
+        glass: What makes it glass, or None.
         colour: Stored RGBA, 0..255 as float32 rows; a texture multiplies it.
         uv_sets: Texture coordinates, transformed: one for each kind that the samplers read, at most three.
     """
@@ -43,6 +45,9 @@ class SurfaceAttributes:
         self._uvs: dict[UvKey, Attribute] = {}
         self.threshold = max(surface.threshold, 0.0)
         self.opacity = self._settled(surface.opacity)
+        self.glass = surface.glass
+        if self.glass is not None and self.glass.has_presence and self.opacity.is_constant:
+            self._settle_presence(self.glass)
         self.colour = self._colour_attribute()
         samplers = [driver.sampler for driver in (surface.colour, self.opacity, surface.emission) if driver.sampler]
         self._keys = list(dict.fromkeys(uv_key(sampler) for sampler in samplers))
@@ -77,6 +82,14 @@ class SurfaceAttributes:
             low, high = min(low, 0.0), max(high, 0.0)
         ends = [min(max(opacity.number_scale * x + opacity.number_bias, 0.0), 1.0) for x in (low, high)]
         return number(ends[0]) if ends[0] == ends[1] else opacity
+
+    def _settle_presence(self, glass: Glass) -> None:
+        """Of glass whose presence comes from a texture that is the same everywhere."""
+        there = self.opacity.number_bias
+        if self.threshold > 0.0:
+            there, self.threshold = float(there >= self.threshold), 0.0
+        self.glass = replace(glass, presence=there, has_presence=False)
+        self.opacity = number(glass.body)
 
     def _reaches_border(self, sampler: Sampler) -> bool:
         """Whether texture coordinates leave the image where black is around it."""
@@ -133,6 +146,8 @@ class SurfaceAttributes:
 
     def _stored_alpha(self) -> Attribute:
         """Stored alpha; where a texture gives the opacity, what it multiplies."""
+        if self.glass is not None and self.opacity.sampler is not None:
+            return _stored(np.array([[self.glass.body if self.glass.has_presence else 1.0]]), "constant")
         if self.opacity.sampler is not None:
             return _stored(np.array([[1.0 if self.threshold > 0.0 else self.solid]]), "constant")
         found = self._values(self.opacity, 1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom, UsdLux, UsdSkel
 
 from renderer.usd.native import Likeness
 from renderer.usd.shape import integers
@@ -19,6 +19,8 @@ from schemas.problem import ExitCode, Problem
 DRAWN_PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
 STAND_INS = (UsdGeom.Tokens.bounds, UsdGeom.Tokens.origin, UsdGeom.Tokens.cards)
 """Draw modes that would show something else instead of a model."""
+INVISIBLE = (UsdGeom.Gprim, UsdGeom.PointInstancer, UsdSkel.Root, UsdSkel.Skeleton)
+"""Kinds with an extent that are drawn for other purposes only, are followed, or show nothing by themselves."""
 MAX_COPIES = 5_000_000
 """Copies of one prim by instancing: 128 bytes each."""
 DEFINED = Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)
@@ -54,6 +56,7 @@ class Walker:
         self._transforms = Transforms(time, log)
         self._skins: Skins | None = None
         self._likeness = Likeness()
+        self._kinds: dict[str, bool] = {}
         self._alike: dict[Hashable, list[Usd.Prim]] = {}
 
     def draws(self, stage: Usd.Stage) -> list[Draw]:
@@ -76,6 +79,7 @@ class Walker:
         for prim in prims:
             imageable = UsdGeom.Imageable(prim)
             if not imageable:
+                self._check_known(prim)
                 continue
             if imageable.GetVisibilityAttr().Get(self._time) == UsdGeom.Tokens.invisible:
                 prims.PruneChildren()
@@ -91,8 +95,8 @@ class Walker:
                     yield from self._instanced(UsdGeom.PointInstancer(prim), relative_to, parents)
             elif prim.IsA(UsdGeom.Gprim) and imageable.ComputePurpose() in DRAWN_PURPOSES:
                 yield self._draw(prim, relative_to)
-            elif prim.IsModel():
-                self._check_draw_mode(prim)
+            else:
+                self._check_drawn(prim)
 
     def _draw(self, prim: Usd.Prim, relative_to: Usd.Prim | None) -> Draw:
         skin = self._skins.of(prim) if self._skins else None
@@ -104,10 +108,23 @@ class Walker:
             return Draw(prim, self._matrix(prim, relative_to)[None])
         return Draw(prim, self._matrix(anchor, relative_to)[None], skin)
 
-    def _check_draw_mode(self, prim: Usd.Prim) -> None:
-        mode = prim.GetAttribute(UsdGeom.Tokens.modelDrawMode)
+    def _check_drawn(self, prim: Usd.Prim) -> None:
+        """Says what of a prim that is no gprim the picture lacks."""
+        mode = prim.GetAttribute(UsdGeom.Tokens.modelDrawMode) if prim.IsModel() else None
         if mode and mode.Get() in STAND_INS:
             self._log.add("model:drawMode is not used, the model itself is drawn", prim.GetPath())
+        if prim.HasAPI(UsdLux.LightAPI):
+            self._log.add("lights are not used, every scene is lit alike", prim.GetPath())
+        elif prim.IsA(UsdGeom.Boundable) and not any(prim.IsA(kind) for kind in INVISIBLE):
+            self._log.add(f"{prim.GetTypeName()} prims are not drawn", prim.GetPath())
+
+    def _check_known(self, prim: Usd.Prim) -> None:
+        """Says that a prim's type is none of this USD: whether it would show is not known."""
+        kind = str(prim.GetTypeName())
+        if kind and kind not in self._kinds:
+            self._kinds[kind] = Usd.SchemaRegistry().FindConcretePrimDefinition(kind) is not None
+        if kind and not self._kinds[kind]:
+            self._log.add(f"prims of the unknown type {kind} are not drawn", prim.GetPath())
 
     def _matrix(self, prim: Usd.Prim, relative_to: Usd.Prim | None) -> NDArray[np.float64]:
         if relative_to is None:

@@ -8,10 +8,12 @@ from pxr import Sdf, Usd, UsdShade
 
 from renderer.usd import materialx
 from renderer.usd.drivers import Driver
+from renderer.usd.glass import GLASSES
 from renderer.usd.networks import Network, category_of
 from renderer.usd.stage import WarningLog, is_inside
 from renderer.usd.surfaces import SURFACES, Surface
 from renderer.usd.textures import TextureTable
+from schemas.glass import GlassReading
 
 GREY = (0.7, 0.7, 0.7, 1.0)
 """Linear RGB of what has neither a material nor a display colour."""
@@ -34,11 +36,13 @@ class MaterialTable:
         time: The time to read at.
         textures: Gets the images.
         log: Gets a line for everything that is not supported.
+        glass: How surfaces that transmit light are read.
     """
 
     time: Usd.TimeCode
     textures: TextureTable
     log: WarningLog
+    glass: GlassReading
     _surfaces: dict[Sdf.Path, Surface | None] = field(default_factory=dict)
     _documents: dict[str, Usd.Stage | None] = field(default_factory=dict)
 
@@ -53,9 +57,11 @@ class MaterialTable:
     def _read(self, shaders: list[UsdShade.Shader], path: Sdf.Path) -> Surface | None:
         """The surface of the first shader of a kind that is known."""
         for shader in shaders:
-            reader = SURFACES.get(category_of(shader))
-            if reader is not None:
-                return reader(Network(self.time, self.textures, self.log), shader)
+            kind = category_of(shader)
+            if kind in SURFACES:
+                network = Network(self.time, self.textures, self.log)
+                pane = GLASSES[kind](network, shader) if self.glass == "fresnel" else None
+                return pane or SURFACES[kind](network, shader)
         kind = shaders[0].GetShaderId() or "shader without an id"
         self.log.add(f"material not supported (its surface is a {kind}), display colour used", path)
         return None

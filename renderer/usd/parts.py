@@ -15,7 +15,6 @@ from renderer.usd.bindings import bindings
 from renderer.usd.materials import DISPLAY, MaterialTable
 from renderer.usd.shape import Shape, integers
 from renderer.usd.surfaces import Surface
-from renderer.usd.textures import TextureTable
 from renderer.usd.topology import area_vectors
 from renderer.usd.weld import weld
 from schemas.scene import Batch, Layer
@@ -62,7 +61,7 @@ def build_parts(prim: Usd.Prim, shape: Shape, table: MaterialTable, alpha: float
     parts: list[Part] = []
     for material, surface, faces in _surfaces(prim, shape, table):
         attributes = SurfaceAttributes(shape, surface, alpha, table)
-        made = _PartBuilder(shape, surface, attributes, table.textures).parts(faces)
+        made = _PartBuilder(shape, surface, attributes, table).parts(faces)
         parts.extend(replace(part, surface=surface, material=material) for part in made)
     return parts
 
@@ -98,11 +97,11 @@ def _surface_of(path: Sdf.Path | None, prim: Usd.Prim, shape: Shape, table: Mate
 class _PartBuilder:
     """Turns the triangles of one surface into parts."""
 
-    def __init__(self, shape: Shape, surface: Surface, attributes: SurfaceAttributes, textures: TextureTable) -> None:
+    def __init__(self, shape: Shape, surface: Surface, attributes: SurfaceAttributes, table: MaterialTable) -> None:
         self._shape = shape
         self._surface = surface
         self._attributes = attributes
-        self._textures = textures
+        self._textures, self._log = table.textures, table.log
         every = (attributes.colour, shape.normals, *attributes.uv_sets)
         self._corner = any(a.domain in ("uniform", "corner") for a in every)
 
@@ -115,8 +114,15 @@ class _PartBuilder:
         positions = self._shape.points[place]
         triangles = triangles[~degenerate(positions, triangles)]
         colours = topology.spread(of.colour, target_of(self._corner))
-        textured, cut_out = of.opacity.sampler is not None, of.solid if of.threshold > 0.0 else None
-        for layer, kept in layers(colours[:, 3][triangles], textured, cut_out):
+        alpha = colours[:, 3][triangles]
+        if of.glass is not None:
+            found = list(layers_of_glass(alpha, of.opacity.sampler is not None, of.glass.presence))
+        else:
+            cut_out = of.solid if of.threshold > 0.0 else None
+            found = list(layers(alpha, of.opacity.sampler is not None, cut_out))
+        if len(triangles) and not any(np.any(kept) for _, kept in found):
+            self._log.add("its opacity is 0, nothing of it is drawn", self._shape.primvars.prim.GetPath())
+        for layer, kept in found:
             if np.any(kept):
                 yield self._part(positions, colours, triangles[kept], layer)
 
@@ -161,6 +167,14 @@ class _PartBuilder:
         style = Batch(first=0, count=0, layer=layer)
         if of.threshold > 0.0:
             style = replace(style, opacity_threshold=of.threshold, cut_out_alpha=of.solid)
+        if of.glass is not None:
+            style = replace(
+                style,
+                reflectance=of.glass.reflectance,
+                transmittance=of.glass.transmittance,
+                presence=of.glass.presence,
+                has_presence_texture=of.glass.has_presence,
+            )
         colour, opacity, emission = self._surface.colour, of.opacity, self._surface.emission
         if colour.sampler is not None:
             style = replace(
@@ -216,3 +230,21 @@ def layers(alpha: NDArray[np.floating], textured: bool, cut_out: float | None) -
     yield "transparent", (low > 0) & (high < 255)
     # Interpolation between opaque or invisible corners and others makes fragments of every kind.
     yield "mixed", ~((low == 255) | (high == 0) | ((low > 0) & (high < 255)))
+
+
+def layers_of_glass(body: NDArray[np.floating], textured: bool, presence: float) -> Iterator[tuple[Layer, Mask]]:
+    """The same for glass, which a share of 0 that does not go through leaves visible.
+
+    Args:
+        body: Stored share of light that is not transmitted, of the corners, 0..255 [T, 3].
+        textured: Whether a texture gives the presence, or that share.
+        presence: Opacity of all of it.
+    """
+    there = round(255.0 * presence)
+    if textured or there < 255:
+        yield "mixed" if textured else "transparent", np.full(len(body), there > 0)
+        return
+    low, high = body.min(axis=1, initial=255.0), body.max(axis=1, initial=0.0)
+    yield "opaque", low == 255
+    yield "transparent", high < 255
+    yield "mixed", (low < 255) & (high == 255)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from renderer.techniques import TECHNIQUES, Needs, technique
+from schemas.glass import DEFAULT_GLASS, GlassReading
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 from schemas.tail import TailName
@@ -33,6 +34,7 @@ class BenchOptions:
         budgets: F as multiples of width * height; None: for each scene and opacity what its views call for
             (`labeller.budgets`).
         alphas: Opacities that every surface gets, one run each; None: the materials' own.
+        glass: How surfaces that transmit light are read.
         sizes: Widths and heights, one run each.
         tails: Of the bounded techniques; those that need a bundle always have its tail. Empty: the usual one.
         g: Steepness of the density tail of those that are named; None: see `services.options.chosen_tail`.
@@ -61,6 +63,7 @@ class BenchOptions:
     out: Path
     budgets: tuple[float, ...] | None = None
     alphas: tuple[float | None, ...] = (None,)
+    glass: GlassReading = DEFAULT_GLASS
     sizes: tuple[tuple[int, int], ...] = (DEFAULT_SIZE,)
     tails: tuple[TailName, ...] = ()
     g: float | None = None

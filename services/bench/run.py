@@ -20,6 +20,7 @@ from renderer.scene import LoadOptions
 from renderer.timing import timers_are_right
 from renderer.usd.digest import scene_digest
 from schemas.bench import BenchCell, BenchResult, BenchView, CellKey, Yardstick
+from schemas.glass import DEFAULT_GLASS
 from schemas.problem import ExitCode, Problem
 from schemas.scene import SceneArrays
 from schemas.view import View
@@ -34,6 +35,7 @@ from services.budgets import holds_all, remedy, said_complete, said_defaults
 from services.local_scenes import LocalScene, as_usd
 from services.progress import Progress
 from services.rendering import bundle_folder
+from services.scene_warnings import said_warnings
 from services.store import canonical_json
 from services.versions import code_version, commit, library_versions, machine
 
@@ -73,9 +75,11 @@ def bench(options: BenchOptions, command: str, progress: Progress, told: Told = 
     left_out: list[str] = []
     with _bundle(options) as bundle:
         for file in options.scenes:
+            warned: set[str] = set()
             with as_usd(file) as usd:
                 for alpha in options.alphas:
                     local = _loaded(options, alpha, file, usd)
+                    _warn(file, local.now.scene.warnings, warned, progress)
                     if local.now.scene.is_opaque:
                         left_out.append(f"{file}, {said_alpha(alpha)}: nothing in it is transparent.")
                         progress.note(left_out[-1])
@@ -117,9 +121,17 @@ def result_of(
 
 
 def _loaded(options: BenchOptions, alpha: float | None, file: Path, usd: Path) -> LocalScene:
-    local = LocalScene(file, usd, LoadOptions(alpha=alpha, variants=options.variants, refine=options.refine))
+    load = LoadOptions(alpha=alpha, glass=options.glass, variants=options.variants, refine=options.refine)
+    local = LocalScene(file, usd, load)
     local.at(None)
     return local
+
+
+def _warn(file: Path, warnings: Sequence[str], warned: set[str], progress: Progress) -> None:
+    """Tells what was not told of the file at another opacity."""
+    for line in said_warnings(file, [text for text in warnings if text not in warned], file):
+        progress.note(line)
+    warned.update(warnings)
 
 
 def _places(options: BenchOptions, alpha: float | None, file: Path, usd: Path, local: LocalScene) -> list[_Place]:
@@ -238,6 +250,7 @@ def _key(place: _Place, options: BenchOptions) -> str:
         "path": options.path,
         "driver": describe(gl_context()),
         "machine": machine(),
+        **({"glass": options.glass} if options.glass != DEFAULT_GLASS else {}),
     }
     return hashlib.sha256(canonical_json(parts).encode()).hexdigest()
 

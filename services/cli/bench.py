@@ -9,9 +9,10 @@ from typing import Annotated
 
 import typer
 
+from schemas.glass import DEFAULT_GLASS
 from schemas.tail import DEFAULT_TAIL, TAIL_HELP
 from services.cli import output
-from services.cli.scene_options import CameraOption, ComplexityOption, RefineOption, VariantOption
+from services.cli.scene_options import CameraOption, ComplexityOption, GlassOption, RefineOption, VariantOption
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
 from services.cli.technique_options import (
     BudgetsOption,
@@ -40,6 +41,7 @@ def bench(
             "--alpha", help="Opacities that every surface gets, and authored: .15,.33,authored. Default: authored."
         ),
     ] = None,
+    glass: GlassOption = DEFAULT_GLASS,
     picture_size: Annotated[
         str, typer.Option("--size", help="WIDTHxHEIGHT in pixels; several with commas between.")
     ] = "1430x960",
@@ -102,6 +104,7 @@ def bench(
     """Measure every technique: time of each pass, bytes, errors, scores at equal fragments and memory, work counted."""
     from services.bench.groups import group, groups_of
     from services.bench.options import BenchOptions, parse_alphas, parse_budgets, parse_device, parse_sizes, parse_tails
+    from services.options import parse_glass
     from services.progress import make_progress
     from services.render_options import parse_needs, parse_refine, parse_techniques, said_left_out
 
@@ -111,6 +114,7 @@ def bench(
         out=out,
         budgets=None if budgets is None else parse_budgets(budgets),
         alphas=parse_alphas(alpha),
+        glass=parse_glass(glass),
         sizes=parse_sizes(picture_size),
         tails=() if tails is None else parse_tails(tails),
         g=g,

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from schemas.glass import DEFAULT_GLASS
 from schemas.network import DEFAULT_NETWORK
 from schemas.pixel_weights import DEFAULT_WEIGHTS, WEIGHTS_HELP
 from schemas.tail import BUNDLE_TAIL_HELP, DEFAULT_TAIL, DENSITY_G
 from services.cli import output
-from services.cli.scene_options import LicenceOption
+from services.cli.scene_options import GlassOption, LicenceOption
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
 from services.cli.technique_options import BudgetsOption
 
@@ -26,6 +27,7 @@ def build(
     name: Annotated[str, typer.Option("--name", help="Name of the bundle in the registry.")],
     budgets: BudgetsOption = None,
     alpha: Annotated[float | None, typer.Option("--alpha", help="Opacity that every surface gets, in (0, 1).")] = None,
+    glass: GlassOption = DEFAULT_GLASS,
     holdout: Annotated[
         list[Path] | None,
         typer.Option("--holdout", help="Scene to evaluate on and never train on; repeatable. Default: a quarter."),
@@ -60,6 +62,7 @@ def build(
     from services.options import (
         BuildOptions,
         parse_budgets,
+        parse_glass,
         parse_licences,
         parse_network,
         parse_size,
@@ -76,6 +79,7 @@ def build(
         holdout=tuple(holdout or ()),
         licences={Path(scene): said for scene, said in parse_licences(licence or (), [*map(str, scenes)]).items()},
         alpha=alpha,
+        glass=parse_glass(glass),
         views=views,
         views_per_scene=views_per_scene,
         width=width,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from schemas.glass import DEFAULT_GLASS
 from services.cli import output
 from services.cli.lines import print_columns, size
 from services.cli.scene_options import (
@@ -16,6 +17,7 @@ from services.cli.scene_options import (
     BackgroundOption,
     CameraOption,
     ComplexityOption,
+    GlassOption,
     RefineOption,
     SizeOption,
     TimeOption,
@@ -41,6 +43,7 @@ def dump(
     complexity: ComplexityOption = None,
     refine: RefineOption = None,
     alpha: AlphaOption = None,
+    glass: GlassOption = DEFAULT_GLASS,
     variant: VariantOption = None,
     background: BackgroundOption = WHITE,
     as_json: JsonOption = False,
@@ -49,10 +52,16 @@ def dump(
     from renderer.scene import LoadOptions
     from services.dumping import DumpOptions
     from services.dumping import dump as run
-    from services.options import parse_size
+    from services.options import parse_glass, parse_size
     from services.render_options import parse_background, parse_refine
+    from services.scene_warnings import said_warnings
 
-    load = LoadOptions(alpha=alpha, variants=tuple(variant or ()), refine=parse_refine(complexity, refine))
+    load = LoadOptions(
+        alpha=alpha,
+        glass=parse_glass(glass),
+        variants=tuple(variant or ()),
+        refine=parse_refine(complexity, refine),
+    )
     dumped = run(
         DumpOptions(
             file=file,
@@ -66,8 +75,8 @@ def dump(
             background=parse_background(background),
         )
     )
-    for warning in dumped.warnings if not as_json else ():
-        output.err().print(f"warning: {warning}", markup=False)
+    for line in said_warnings(file, dumped.warnings, file) if not as_json else ():
+        output.err().print(line, markup=False)
     if as_json:
         files = [{**asdict(each), "path": str(each.path)} for each in dumped.written]
         output.print_json({**asdict(dumped), "written": files})

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from schemas.glass import DEFAULT_GLASS
 from services.cli import output
 from services.cli.lines import size
 from services.cli.scene_options import (
@@ -16,6 +17,7 @@ from services.cli.scene_options import (
     BackgroundOption,
     CameraOption,
     ComplexityOption,
+    GlassOption,
     RefineOption,
     SizeOption,
     VariantOption,
@@ -81,6 +83,7 @@ def render(
     complexity: ComplexityOption = None,
     refine: RefineOption = None,
     alpha: AlphaOption = None,
+    glass: GlassOption = DEFAULT_GLASS,
     variant: VariantOption = None,
     background: BackgroundOption = WHITE,
     is_full: Annotated[bool, typer.Option("--float", help="32-bit channels in .exr, not half floats.")] = False,
@@ -89,7 +92,7 @@ def render(
 ) -> None:
     """Render pictures by any technique within a budget, and say what each cost."""
     from renderer.scene import LoadOptions
-    from services.options import parse_size, parse_tail
+    from services.options import parse_glass, parse_size, parse_tail
     from services.progress import make_progress
     from services.render_options import (
         RenderOptions,
@@ -114,7 +117,12 @@ def render(
         image_width=image_width,
         size=None if picture_size is None else parse_size(picture_size),
         frames=parse_times(frames, default_time),
-        load=LoadOptions(alpha=alpha, variants=tuple(variant or ()), refine=parse_refine(complexity, refine)),
+        load=LoadOptions(
+            alpha=alpha,
+            glass=parse_glass(glass),
+            variants=tuple(variant or ()),
+            refine=parse_refine(complexity, refine),
+        ),
         background=parse_background(background),
         output=target,
         is_full=is_full,

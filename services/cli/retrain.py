@@ -19,6 +19,7 @@ from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption, connect
 from services.cli.state import JsonOption
 from services.cli.submit import (
     AlphaOption,
+    GlassOption,
     NetworkOption,
     NoReplayOption,
     PatienceOption,
@@ -66,6 +67,7 @@ def retrain(
     licence: LicenceOption = None,
     budgets: BudgetsOption = None,
     alpha: AlphaOption = None,
+    glass: GlassOption = None,
     views: ViewsOption = None,
     views_per_scene: ViewsPerSceneOption = None,
     size: SizeOption = None,
@@ -87,6 +89,7 @@ def retrain(
     fields = job_fields(
         budgets=budgets,
         alpha=alpha,
+        glass=glass,
         views_per_scene=views_per_scene,
         size=size,
         tail=tail,

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from schemas.glass import DEFAULT_GLASS
 from services.cli import output
 from services.cli.lines import plain, print_columns
 from services.cli.scene_options import (
     AlphaOption,
     ComplexityOption,
+    GlassOption,
     RefineOption,
     SceneArgument,
     TimeOption,
@@ -35,6 +37,7 @@ def inspect(
     variant: VariantOption = None,
     time: TimeOption = None,
     alpha: AlphaOption = None,
+    glass: GlassOption = DEFAULT_GLASS,
     complexity: ComplexityOption = None,
     refine: RefineOption = None,
     as_json: JsonOption = False,
@@ -45,9 +48,16 @@ def inspect(
     from renderer.inspection import inspect_scene
     from renderer.scene import LoadOptions
     from services.local_scenes import as_usd
+    from services.options import parse_glass
     from services.render_options import parse_refine
 
-    load = LoadOptions(alpha=alpha, time=time, variants=tuple(variant or ()), refine=parse_refine(complexity, refine))
+    load = LoadOptions(
+        alpha=alpha,
+        glass=parse_glass(glass),
+        time=time,
+        variants=tuple(variant or ()),
+        refine=parse_refine(complexity, refine),
+    )
     with as_usd(file) as usd:
         report = replace(inspect_scene(usd, load), file=str(file))
     if as_json:

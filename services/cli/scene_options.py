@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from schemas.glass import GLASS_HELP
+
 SceneArgument = Annotated[
     Path, typer.Argument(metavar="FILE", help="A scene: .usd, .usda, .usdc, .usdz, .glb, .gltf, .obj, .ply or .stl.")
 ]
@@ -21,6 +23,7 @@ LicenceOption = Annotated[
 AlphaOption = Annotated[
     float | None, typer.Option("--alpha", help="Opacity that every surface gets, in (0, 1]. Default: its own.")
 ]
+GlassOption = Annotated[str, typer.Option("--glass", help=GLASS_HELP)]
 VariantOption = Annotated[
     list[str] | None,
     typer.Option("--variant", help="Selection SET=CHOICE, or /PRIM:SET=CHOICE for one prim; repeatable."),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from schemas.glass import GLASS_HELP
 from schemas.pixel_weights import WEIGHTS_HELP
 from schemas.problem import Problem
 from schemas.tail import TAIL_HELP
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 AlphaOption = Annotated[float | None, typer.Option("--alpha", help="Opacity that every surface gets, in (0, 1).")]
 ViewsOption = Annotated[Path | None, typer.Option("--views", help="JSON file with the views of local scenes.")]
+GlassOption = Annotated[str | None, typer.Option("--glass", help=GLASS_HELP)]
 ViewsPerSceneOption = Annotated[
     int | None, typer.Option("--views-per-scene", help="Views sampled of a scene that has no cameras.")
 ]
@@ -58,6 +60,7 @@ def submit(
     licence: LicenceOption = None,
     budgets: BudgetsOption = None,
     alpha: AlphaOption = None,
+    glass: GlassOption = None,
     views: ViewsOption = None,
     views_per_scene: ViewsPerSceneOption = None,
     size: SizeOption = None,
@@ -91,6 +94,7 @@ def submit(
     fields = job_fields(
         budgets=budgets,
         alpha=alpha,
+        glass=glass,
         views_per_scene=views_per_scene,
         size=size,
         tail=tail,
@@ -130,6 +134,7 @@ def job_fields(
     tail: str | None,
     network: str | None,
     weights: str | None,
+    glass: str | None,
     **plain_fields: Any,
 ) -> dict[str, Any]:
     """Fields of a job from options; what was not given is left to the server's defaults.
@@ -137,7 +142,7 @@ def job_fields(
     Raises:
         Problem: An option cannot be read.
     """
-    from services.options import parse_budgets, parse_network, parse_size, parse_tail, parse_weights
+    from services.options import parse_budgets, parse_glass, parse_network, parse_size, parse_tail, parse_weights
 
     fields = {name: value for name, value in plain_fields.items() if value is not None}
     if budgets is not None:
@@ -148,6 +153,8 @@ def job_fields(
         fields["tail"] = parse_tail(tail)
     if network is not None:
         fields["network"] = parse_network(network)
+    if glass is not None:
+        fields["glass"] = parse_glass(glass)
     if weights is not None:
         fields["weights"] = parse_weights(weights)
     return fields

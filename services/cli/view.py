@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from schemas.glass import DEFAULT_GLASS
 from schemas.problem import Problem
 from services.cli import output
 from services.cli.scene_options import (
@@ -16,6 +17,7 @@ from services.cli.scene_options import (
     BackgroundOption,
     CameraOption,
     ComplexityOption,
+    GlassOption,
     RefineOption,
     SceneArgument,
     TimeOption,
@@ -80,6 +82,7 @@ def view(
     complexity: ComplexityOption = None,
     refine: RefineOption = None,
     alpha: AlphaOption = None,
+    glass: GlassOption = DEFAULT_GLASS,
     variant: VariantOption = None,
     background: BackgroundOption = WHITE,
     frames: Annotated[
@@ -100,7 +103,7 @@ def view(
 ) -> None:
     """Look at a scene with two techniques: pictures, differences, k, times, bytes and errors. H lists the keys."""
     from renderer.scene import LoadOptions
-    from services.options import check_bundle, parse_size, parse_tail
+    from services.options import check_bundle, parse_glass, parse_size, parse_tail
     from services.progress import make_progress
     from services.render_options import (
         RenderOptions,
@@ -134,7 +137,12 @@ def view(
             image_width=image_width,
             size=None if picture_size is None else parse_size(picture_size),
             frames=() if time is None else (time,),
-            load=LoadOptions(alpha=alpha, variants=tuple(variant or ()), refine=parse_refine(complexity, refine)),
+            load=LoadOptions(
+                alpha=alpha,
+                glass=parse_glass(glass),
+                variants=tuple(variant or ()),
+                refine=parse_refine(complexity, refine),
+            ),
             background=parse_background(background),
             state=state,
         ),

@@ -12,6 +12,7 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.background import BackgroundTask
 
+from schemas.glass import DEFAULT_GLASS
 from schemas.limits import LIMITS
 from schemas.service import SceneRecord
 from services.api.etags import is_current
@@ -135,6 +136,7 @@ class Compared:
         parts += [f"--scene {self.scene.id} --model {model} --size {measured.width}x{measured.height}"]
         parts += [f"--budgets {','.join(f'{budget:g}' for budget in budgets)}"] if budgets else []
         parts += [f"--alpha {measured.alpha:g}"] if measured.alpha is not None else []
+        parts += [f"--glass {measured.glass}"] if measured.glass != DEFAULT_GLASS else []
         return " ".join((*parts, f"--tail {measured.tail}"))
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import sqlalchemy as sa
 from markupsafe import Markup
 
+from schemas.glass import DEFAULT_GLASS
 from schemas.measurement import Measurement
 from services import summary
 from services.dashboard.scene_views import camera_of, setting_of
@@ -98,6 +99,7 @@ def history(database: Database, name: str, versions: Sequence[str]) -> list[Scen
             table.c.budget_factor,
             data["budget"].as_integer().label("budget"),
             data["alpha"].as_float().label("alpha"),
+            data["glass"].as_string().label("glass"),
             data["total_fragments"].as_integer().label("fragments"),
             data["camera"].as_json().label("camera"),  # two may have the same name
             data["mse"].as_float().label("mse"),
@@ -112,7 +114,8 @@ def history(database: Database, name: str, versions: Sequence[str]) -> list[Scen
             if row.mse is not None:
                 errors = found[row.scene, row.scene_digest][row.model]
                 camera = camera_of(row.camera)
-                picture = row.view, camera, row.fragments, row.budget_factor, row.budget, row.alpha
+                glass = row.glass or DEFAULT_GLASS
+                picture = row.view, camera, row.fragments, row.budget_factor, row.budget, row.alpha, glass
                 errors.setdefault(picture, max(row.mse, summary.MSE_FLOOR))
     titles = _titles(found)
     return [SceneHistory(titles[scene], _compared(found[scene], shown)) for scene in sorted(found)]

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import sqlalchemy as sa
 
+from schemas.glass import DEFAULT_GLASS
 from schemas.measurement import Certificate, Measurement
 from services import summary
 from services.database import Database
@@ -99,6 +100,7 @@ class Setting(NamedTuple):
         width: Pixels per row.
         height: Rows.
         alpha: Opacity of every surface; None: the materials' own.
+        glass: How surfaces that transmit light are read.
         tail: How the fragments beyond k are averaged.
         fragments: N: it differs where another version of the code reads the scene otherwise.
     """
@@ -107,6 +109,7 @@ class Setting(NamedTuple):
     width: int
     height: int
     alpha: float | None
+    glass: str
     tail: str
     fragments: int
 
@@ -123,6 +126,8 @@ class Setting(NamedTuple):
             found.append(f"at {self.width} x {self.height} pixels")
         if self.alpha != other.alpha:
             found.append(f"with {_OWN if self.alpha is None else f'opacity {self.alpha:g}'}")
+        if self.glass != other.glass:
+            found.append(f"with glass read as {self.glass}")
         if self.tail != other.tail:
             found.append(f"with the tail {self.tail}")
         if self.fragments != other.fragments and not found:
@@ -138,8 +143,11 @@ def setting_of(data: Mapping[str, Any]) -> Setting:
     Args:
         data: `schemas.measurement.Measurement` as JSON.
     """
-    fields = (data[name] for name in ("width", "height", "alpha", "tail", "total_fragments"))
-    return Setting(camera_of(data.get("camera")), *fields)
+    width, height, alpha, tail, fragments = (
+        data[name] for name in ("width", "height", "alpha", "tail", "total_fragments")
+    )
+    glass = data.get("glass", DEFAULT_GLASS)
+    return Setting(camera_of(data.get("camera")), width, height, alpha, glass, tail, fragments)
 
 
 def camera_of(view: Mapping[str, Any] | None) -> str | None:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
+from schemas.glass import DEFAULT_GLASS
 from schemas.job import FINAL_STATES, JobKind, JobSpec, JobState, TaskState
 from schemas.pixel_weights import DEFAULT_WEIGHTS
 from schemas.problem import ExitCode, Problem
@@ -370,7 +371,7 @@ class Jobs:
 _SELECT = sa.select(tables.jobs)
 
 
-_LATER_FIELDS = {"replay": True, "patience": 0, "weights": DEFAULT_WEIGHTS}
+_LATER_FIELDS = {"replay": True, "patience": 0, "weights": DEFAULT_WEIGHTS, "glass": DEFAULT_GLASS}
 """Fields that specs did not have from the beginning, with their defaults: a request from before is still the same."""
 
 

@@ -37,7 +37,7 @@ class Desk:
 
     def __init__(self, store: Store, folder_of: FolderOf) -> None:
         self.store, self._folder_of = store, folder_of
-        self._loaded: tuple[str, float | None] | None = None
+        self._loaded: tuple[str, float | None, str] | None = None
         self._scene: SceneArrays | None = None
         self._gpu: GpuScene | None = None
         self._compiled: set[str] = set()
@@ -80,12 +80,12 @@ class Desk:
         """The scene's triangles; only the last one asked for is kept in memory."""
         from renderer.scene import LoadOptions, load_scene
 
-        alpha = task.params["alpha"]
-        wanted = _present(task.scene, task).digest, alpha
+        alpha, glass = task.params["alpha"], task.params["glass"]
+        wanted = _present(task.scene, task).digest, alpha, glass
         if self._scene is None or self._loaded != wanted:
             self._gpu, self._scene = None, None
             path = self.scene_path(task)
-            self._scene = load_scene(path, LoadOptions(alpha=alpha, home=self._home(task, path)))
+            self._scene = load_scene(path, LoadOptions(alpha=alpha, glass=glass, home=self._home(task, path)))
             self._loaded = wanted
         return self._scene
 

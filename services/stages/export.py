@@ -60,6 +60,7 @@ def _description(task: Task, trained: Facts, views: int) -> Description:
                 "alpha": settings["alpha"],
                 "size": settings["size"],
                 "budgets": settings["budgets"],
+                **({"glass": settings["glass"]} if "glass" in settings else {}),
                 **({"weights": settings["weights"]} if "weights" in settings else {}),
                 "views": views,
                 "training": trained["config"],

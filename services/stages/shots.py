@@ -184,6 +184,7 @@ class Shot:
             width=width,
             height=height,
             alpha=params["alpha"],
+            glass=params["glass"],
             tail=self.session.tail,
             total_fragments=self.session.dump.total,
             **measured,

@@ -57,6 +57,7 @@ def scene_task(plan: Plan, scene: PlannedScene) -> Task:
         inputs=(scene.source.digest,),
         params={
             "alpha": plan.alpha,
+            "glass": plan.glass,
             "views": [view.model_dump(mode="json") for view in scene.listed],
             "count": plan.views_per_scene,
             "seed": plan.seed,
@@ -218,7 +219,8 @@ def _network(bundle: Source) -> str:
 
 
 def _picture(plan: Plan, view: View) -> dict[str, Any]:
-    return {"view": view.model_dump(mode="json"), "size": [plan.width, plan.height], "alpha": plan.alpha}
+    size = [plan.width, plan.height]
+    return {"view": view.model_dump(mode="json"), "size": size, "alpha": plan.alpha, "glass": plan.glass}
 
 
 def _weights(plan: Plan) -> dict[str, Any]:

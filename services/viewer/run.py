@@ -11,6 +11,7 @@ from schemas.bundle import load_manifest
 from services.options import check_trained_tail, chosen_tail
 from services.progress import Progress
 from services.render_options import EVERY, parse_techniques
+from services.scene_warnings import said_warnings
 from services.viewer import statistics
 from services.viewer.comparing import Comparer
 from services.viewer.controls import Look, Place
@@ -44,8 +45,8 @@ def view(options: ViewerOptions, service: Service | None, progress: Progress) ->
         local_source(asked.bundle, asked.state) if service is None else remote_source(service)
     )
     with bundle as source, opened(options) as scene:
-        for warning in scene.scene.now.scene.warnings:
-            progress.note(f"warning: {scene.scene.file}: {warning}")
+        for line in said_warnings(scene.scene.file, scene.scene.now.scene.warnings, scene.scene.file):
+            progress.note(line)
         if options.frames is not None:
             return _write_frames(options, options.frames, scene, source, progress)
         return _show(options, scene, source, progress)

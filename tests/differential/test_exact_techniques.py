@@ -69,6 +69,7 @@ def cases() -> dict[str, tuple[SceneArrays, View, tuple[int, int]]]:
     opaque = tuple(batch for batch in shells.batches if batch.layer == "opaque")
     return {
         "ties": (shells, scenes.VIEW, size),
+        "glass": (scenes.with_glass(shells), scenes.VIEW, size),
         "repeated": (drawn_twice(shells), scenes.VIEW, size),
         "one": (stacks.stack_scene(stack(1)), stacks.VIEW, stacks.size(2)),
         "many": (stacks.stack_scene(stack(LAYERS)), stacks.VIEW, stacks.size(2)),

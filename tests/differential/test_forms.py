@@ -45,6 +45,7 @@ pytestmark = [
 ]
 
 WEIGHTS = random_weights(6, hidden=(12, 8))
+OUTPUTS = len(WEIGHTS.outputs)
 
 HLSL_MAIN = f"""
 StructuredBuffer<float> inputs : register(t0);
@@ -57,8 +58,8 @@ void main(uint3 id : SV_DispatchThreadID) {{
     if (id.x * DIAPHANE_OUTPUTS >= count) return;
     float x[DIAPHANE_FEATURES];
     for (uint i = 0; i < DIAPHANE_FEATURES; ++i) x[i] = inputs[id.x * DIAPHANE_FEATURES + i];
-    DiaphaneAnswer answer = diaphane_predict(x);
-    for (uint j = 0; j < DIAPHANE_OUTPUTS; ++j) outputs[id.x * DIAPHANE_OUTPUTS + j] = answer.y[j];
+    DiaphaneAnswer found = diaphane_predict(x);
+    for (uint j = 0; j < DIAPHANE_OUTPUTS; ++j) outputs[id.x * DIAPHANE_OUTPUTS + j] = found.y[j];
 }}
 """
 
@@ -72,8 +73,8 @@ void main() {{
     if (row * DIAPHANE_OUTPUTS >= outputs.length()) return;
     float x[DIAPHANE_FEATURES];
     for (int i = 0; i < DIAPHANE_FEATURES; ++i) x[i] = inputs[row * DIAPHANE_FEATURES + i];
-    DiaphaneAnswer answer = diaphane_predict(x);
-    for (int j = 0; j < DIAPHANE_OUTPUTS; ++j) outputs[row * DIAPHANE_OUTPUTS + j] = answer.y[j];
+    DiaphaneAnswer found = diaphane_predict(x);
+    for (int j = 0; j < DIAPHANE_OUTPUTS; ++j) outputs[row * DIAPHANE_OUTPUTS + j] = found.y[j];
 }}
 """
 
@@ -128,14 +129,12 @@ def compared(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> 
     folder, work = tmp_path_factory.mktemp("bundle"), tmp_path_factory.mktemp("work")
     export_random(folder, weights, features, gl)
     text = {name: (folder / name).read_text() for name in (GLSL, GLSL_HALF, HLSL, UBO, UBO_HALF, WGSL, WGSL_HALF)}
-    shaders = {name: webgpu.Shader(text[name] + webgpu.PREDICT, len(WEIGHTS.outputs)) for name in (WGSL, WGSL_HALF)}
-    shaders[HLSL] = webgpu.Shader(spirv(work / HLSL, text[HLSL] + HLSL_MAIN, "-D"), len(WEIGHTS.outputs))
+    shaders = {name: webgpu.Shader(text[name] + webgpu.PREDICT, OUTPUTS) for name in (WGSL, WGSL_HALF)}
+    shaders[HLSL] = webgpu.Shader(spirv(work / HLSL, text[HLSL] + HLSL_MAIN, "-D"), OUTPUTS)
     for name, data in ((GLSL, None), (GLSL_HALF, None), (UBO, UBO_DATA), (UBO_HALF, UBO_HALF_DATA)):
         extension = FLOAT16 if "half" in name else ""
         code = f"#version 450\n{extension}#define DIAPHANE_BINDING 2\n{text[name]}{GLSL_MAIN}"
-        shaders[name] = webgpu.Shader(
-            spirv(work / name, code), len(WEIGHTS.outputs), (folder / data).read_bytes() if data else None
-        )
+        shaders[name] = webgpu.Shader(spirv(work / name, code), OUTPUTS, (folder / data).read_bytes() if data else None)
     inputs = np.ascontiguousarray(features[:, weights.columns])
     found = webgpu.run(work, shaders, inputs)
     return Compared(folder, features, inputs, torch_outputs(weights, inputs), found)
@@ -162,7 +161,7 @@ def test_hlsl_agrees_with_torch_by_the_compiler_of_direct3d(compared: Compared, 
     # Direct3D 12 reads DXIL, of which this checks that it is made without a warning; SPIR-V is what can run here.
     dxc("cs_6_0", "-WX", source, tmp_path / "dxil")
     binary = dxc("cs_6_2", "-spirv", source, tmp_path / "spirv")
-    found = webgpu.run(tmp_path, {HLSL: webgpu.Shader(binary, len(WEIGHTS.outputs))}, compared.inputs)[HLSL]
+    found = webgpu.run(tmp_path, {HLSL: webgpu.Shader(binary, OUTPUTS)}, compared.inputs)[HLSL]
     assert 0.0 < (np.abs(found - compared.truth) / np.maximum(1.0, np.abs(compared.truth))).max() <= 1e-5
 
 

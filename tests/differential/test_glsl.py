@@ -13,7 +13,7 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
-from support.scenes import VIEW, shells
+from support.scenes import VIEW, shells, with_glass
 from support.training import export_random, random_weights
 
 from renderer import programs
@@ -51,7 +51,7 @@ def compiled(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> 
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(programs, "expand", recorded)
-        frame = Frame(GpuScene(gl, shells(subdivisions=1)), VIEW, 32, 24)
+        frame = Frame(GpuScene(gl, with_glass(shells(subdivisions=1))), VIEW, 32, 24)
         dump = capture(frame).dump
         hidden_fragments(frame)
         stacks = extreme_stacks(300)  # runs that one thread does not sort
@@ -59,9 +59,7 @@ def compiled(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> 
         bundle = tmp_path_factory.mktemp("bundle")
         features = derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0]
         export_random(bundle, random_weights(4), features, gl)
-        export_random(
-            bundle / "importances", random_weights(4, head="importance", outputs=("importance",)), features, gl
-        )
+        export_random(bundle / "importances", random_weights(4, head="importance"), features, gl)
         needs = Needs(bundle=bundle, allocate=lambda frame, _: np.minimum(frame.count(), 2).astype(np.int32))
         for folder in (bundle, bundle / "importances"):
             deep, listed = KBufferDeep(folder), np.flatnonzero(dump.counts).astype(np.uint32)
@@ -80,7 +78,7 @@ def compiled(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> 
         without,
         *(word_defines(tail, luma=False) if tail.bins else tail.defines for tail in TAILS.values()),
     ):  # the driver may lack what it needs
-        for surface in ({"TEXTURED": 0, "MIXED": 0}, {"TEXTURED": 1, "MIXED": 1}):
+        for surface in ({"TEXTURED": 0, "MIXED": 0, "GLASS": 0}, {"TEXTURED": 1, "MIXED": 1, "GLASS": 1}):
             defines = {**row, "MAX_EXPONENT": MAX_EXPONENT, "WRAPPED": 0, "MORE_UVS": 0, "EMISSIVE": 0}
             recorded("kbuffer/chain.frag", {**defines, **surface})
     return texts

@@ -34,7 +34,7 @@ CONSTANTS: Defines = {
 BINS = ("TAIL", *KINDS, *BIN_CONSTANTS)
 BINNED = [name for name, tail in TAILS.items() if tail.bins]
 
-SURFACE: Defines = {"TEXTURED": 0, "MIXED": 1, "WRAPPED": 0, "MORE_UVS": 0, "EMISSIVE": 0}
+SURFACE: Defines = {"TEXTURED": 0, "MIXED": 1, "WRAPPED": 0, "MORE_UVS": 0, "EMISSIVE": 0, "GLASS": 0}
 """Of the renderer's own surfaces, which a client replaces; `MIXED` is the document's."""
 
 IMPORTANCES = random_weights(1, head="importance")

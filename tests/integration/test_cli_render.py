@@ -284,6 +284,29 @@ def test_inspect_prints_what_was_found(folder: Path, capsys: pytest.CaptureFixtu
     assert report["file"] == "panes.usda"
 
 
+def test_glass_is_drawn_and_what_a_picture_lacks_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    stage = Usd.Stage.Open("panes.usda")
+    stage.GetPrimAtPath("/World/Glass/Surface").GetAttribute("inputs:opacity").Set(0.0)
+    stage.DefinePrim("/World/Sun", "DistantLight")
+    stage.Save()
+    (glass,) = answer(capsys, "render", "panes.usda", "-w", "40", "-o", "glass.png")["pictures"]
+    (plain,) = answer(capsys, "render", "panes.usda", "-w", "40", "-o", "plain.png", "--glass", "plain")["pictures"]
+    assert glass["fragments"] > plain["fragments"] > 0
+    told = "warning: panes.usda: lights are not used, every scene is lit alike: /World/Sun"
+    lost = "warning: panes.usda: its opacity is 0, nothing of it is drawn: /World/Pane0 (and 2 more)"
+    bench = ["bench", "panes.usda", "-t", "kbuffer", "--budgets", "1", "--size", "48x32", "--repeats", "1"]
+    bench += ["--equal-fragments", "--no-account", "-o", "out"]
+    for command in (["render", "panes.usda", "-w", "40"], bench, ["dump", "panes.usda", "-o", "d", "-w", "40"]):
+        assert run(command) == ExitCode.OK
+        assert capsys.readouterr().err.count(told) == 1
+    assert run(["render", "panes.usda", "-w", "40", "--glass", "plain"]) == ExitCode.OK
+    assert lost in capsys.readouterr().err
+    assert run(["scene", "inspect", "panes.usda"]) == ExitCode.OK
+    assert "glass: opacity 0, ior 1.5, drawn with Fresnel alpha .04 to 1" in capsys.readouterr().out
+    assert run(["render", "panes.usda", "--glass", "thick"]) == ExitCode.USAGE
+    assert "fresnel, plain" in capsys.readouterr().err
+
+
 def test_inspect_reports_a_scene_without_geometry_and_ends_with_the_problem(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

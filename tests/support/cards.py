@@ -9,6 +9,7 @@ from PIL import Image
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 
 from renderer.scene import LoadOptions, load_scene
+from schemas.glass import DEFAULT_GLASS, GlassReading
 from schemas.scene import SceneArrays
 
 Types = Sdf.ValueTypeNames
@@ -62,11 +63,11 @@ class Card:
             put(texture, "st", reader.CreateOutput("result", Types.Float2))
         return texture
 
-    def load(self, alpha: float | None = None) -> SceneArrays:
+    def load(self, alpha: float | None = None, glass: GlassReading = DEFAULT_GLASS) -> SceneArrays:
         """The stage, written and read."""
         file = self.folder / "card.usda"
         self.stage.GetRootLayer().Export(str(file))
-        return load_scene(file, LoadOptions(alpha=alpha))
+        return load_scene(file, LoadOptions(alpha=alpha, glass=glass))
 
 
 def put(shader: UsdShade.Shader, key: str, value: object) -> None:

@@ -67,6 +67,7 @@ class TableRunner:
         self.fails = set(fails)
         self.opaque: set[str] = set()
         self.empty: set[str] = set()
+        self.warnings: dict[str, list[str]] = {}
         self.totals: dict[str, int] = {}
         self.licences: dict[str, str] = {}
         self.cards: list[str] = []
@@ -117,7 +118,7 @@ class TableRunner:
                 "triangles": 12,
                 "opaque": task.name in self.opaque,
                 "content": task.inputs[0],
-                "warnings": [],
+                "warnings": self.warnings.get(task.name, []),
                 "licence": self.licences.get(task.name, ""),
             }
         if task.stage == "render":

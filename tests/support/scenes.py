@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import trimesh
 
@@ -70,3 +72,10 @@ def shells(layers: int = 6, duplicates: int = 2, subdivisions: int = 2) -> Scene
     pixels = rng.integers(0, 256, (16, 16, 4)).astype(np.uint8)
     pixels[:5, :, 3], pixels[5:10, :, 3] = 0, 255
     return builder.scene((Texture("noise", pixels, True, ("repeat", "clamp")),))
+
+
+def with_glass(scene: SceneArrays) -> SceneArrays:
+    """The scene with all that is not opaque twice: the second time as glass, whose texture gives the presence."""
+    seen = [batch for batch in scene.batches if batch.layer != "opaque"]
+    panes = [replace(b, reflectance=(0.04, 1.0), has_presence_texture=b.opacity_texture >= 0) for b in seen]
+    return replace(scene, batches=(*scene.batches, *panes))

@@ -37,14 +37,14 @@ PREDICT = (
     for (var i = 0u; i < DIAPHANE_FEATURES; i++) {
         x[i] = inputs[row * DIAPHANE_FEATURES + i];
     }
-    var answer = diaphane_predict(x);
+    let y = diaphane_predict(x);
     for (var i = 0u; i < DIAPHANE_OUTPUTS; i++) {
-        outputs[row * DIAPHANE_OUTPUTS + i] = answer.y[i];
+        outputs[row * DIAPHANE_OUTPUTS + i] = y[i];
     }
 }
 """
 )
-"""What calls a bundle's WGSL."""
+"""What calls a bundle's WGSL; replace `y[i]` by `y` for one output."""
 
 
 @dataclass(frozen=True)

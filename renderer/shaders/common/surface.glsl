@@ -1,6 +1,7 @@
 // Shading, shared by every pass: linear light, then the one quantisation (schemas/colour.py).
 // Defines, each 0 or 1, are properties of the batch (renderer/gpu_scene.py: variant): TEXTURED has textures or a cut-out,
-// WRAPPED mirrors or ends in black, MORE_UVS reads further texture coordinates, EMISSIVE adds a texture.
+// WRAPPED mirrors or ends in black, MORE_UVS reads further texture coordinates, EMISSIVE adds a texture, GLASS lets light
+// through.
 in float v_depth;
 in vec3 v_normal;
 in vec2 v_uv;
@@ -47,6 +48,9 @@ vec3 shade(vec3 albedo) {
     return albedo * (0.25 + 0.3 * sky + 0.6 * diffuse) + 0.25 * highlight;
 }
 
+#if GLASS
+#include "common/glass.glsl"
+#else
 // The fragment as it is stored: x, y, z = gamma-2 encoded RGB, w = alpha, all integers in 0..255.
 // w = 0 means that there is nothing here (a cut-out, or fully transparent); w = 255 that it is opaque.
 uvec4 stored_surface() {
@@ -64,6 +68,7 @@ uvec4 stored_surface() {
     vec3 encoded = sqrt(clamp(shade(albedo), 0.0, 1.0));
     return uvec4(vec4(encoded, clamp(alpha, 0.0, 1.0)) * 255.0 + 0.5);  // conversion truncates
 }
+#endif
 
 // One word a fragment; as a little-endian uint32 its bytes are r, g, b, a.
 uint pack(uvec4 stored) {

@@ -15,7 +15,11 @@ uniform mat4 projection;
 
 invariant gl_Position;
 invariant out float v_depth;
+#if GLASS
+invariant out vec3 v_normal;  // alpha depends on it
+#else
 out vec3 v_normal;
+#endif
 out vec2 v_uv;
 out vec4 v_colour;
 

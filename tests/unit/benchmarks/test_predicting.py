@@ -14,7 +14,7 @@ from support.training import random_weights
 
 from benchmarks.labelling.plot import Labels, log_log
 from benchmarks.predicting.cost import network_cost
-from benchmarks.predicting.cuts import bin_counts, core_of, frame_events
+from benchmarks.predicting.cuts import core_of, frame_events
 from benchmarks.predicting.labels import OPTIMUM, RIVALS, labels_of, oracle_of
 from benchmarks.predicting.scoring import is_worse, ratio
 from benchmarks.predicting.store import CODE, Store, key_of
@@ -26,10 +26,11 @@ from labeller.curves import UNREACHABLE, error_curves, whole_bins
 from labeller.reference import depth_bins
 from labeller.reference import pixel_of as plain_pixel
 from labeller.shards import read_shard
+from renderer.depth_bins import bin_counts
 from renderer.features import FEATURES, reads_luma
 from renderer.tile_range import tile_ranges
 from schemas.fragments import FragmentDump
-from schemas.tail import BINNED_TAILS, TAILS, TailName
+from schemas.tail import BINNED_TAILS, MOST_BINS, TAILS, TailName
 
 DUMP = random_dump(24, 16, 12, seed=5)
 
@@ -56,15 +57,13 @@ def test_fragments_are_counted_by_bin(dump: FragmentDump, tail: TailName) -> Non
     for p in range(dump.pixels):
         pixel = plain_pixel(dump, p)
         bins = depth_bins(pixel, -np.log1p(-pixel.alpha), TAILS[tail]).bin if pixel.n else np.zeros(0, np.int64)
-        assert np.array_equal(found[p], np.bincount(bins, minlength=TAILS[tail].bins))
+        assert np.array_equal(found[p], np.bincount(bins, minlength=MOST_BINS))
 
 
 @pytest.mark.parametrize("tail", BINNED_TAILS)
 def test_cores_are_whole_bins_within_the_budget(tail: TailName) -> None:
     curves = whole_bins(DUMP, error_curves(DUMP, tail))
-    occupied = int(np.count_nonzero(DUMP.counts))
-    rng = np.random.default_rng(3)
-    events = frame_events(DUMP, tail, rng.normal(-6.0, 2.0, occupied), rng.uniform(0.1, 2.0, occupied))
+    events = frame_events(DUMP, tail, random_weights(3, tail=tail))
     most = int(bin_counts(DUMP, tail).max())
     for budget in (0, 40, DUMP.total // 2, DUMP.total, DUMP.total + 5):
         k = core_of(DUMP, *events, budget)
@@ -74,7 +73,7 @@ def test_cores_are_whole_bins_within_the_budget(tail: TailName) -> None:
 
 def test_costs_are_those_of_the_frame() -> None:
     lean = network_cost(random_weights(1, ("log_n", "optical_depth"), (8,)), "binned-12")
-    assert (lean.weights, lean.multiply_adds) == (2 * 8 + 8 + 8 * 2 + 2, 2 * 8 + 8 * 2)
+    assert (lean.weights, lean.multiply_adds) == (2 * 8 + 8 + 8 * 13 + 13, 2 * 8 + 8 * 13)
     full = network_cost(random_weights(1, FEATURES, (8,)), "binned-12")
     assert (lean.early_bytes, full.early_bytes) == (58, 62)
     assert lean.free_slots == full.free_slots == 2

@@ -25,7 +25,7 @@ from labeller.shard_file import open_columns, write_columns
 from labeller.shards import Shard, read_rows, read_shard, write_shard
 from renderer.features import FEATURES, derive, gather
 from schemas.problem import ExitCode, Problem
-from schemas.tail import DEFAULT_TAIL
+from schemas.tail import DEFAULT_TAIL, MOST_BINS
 
 DUMP = random_dump(40, 30, 8, seed=1)
 CURVES = whole_bins(DUMP, error_curves(DUMP))
@@ -199,6 +199,7 @@ def test_lists_longer_than_65535_need_wider_columns(tmp_path: Path) -> None:
     columns = {
         "features": np.zeros((2, len(FEATURES)), np.float32),
         "n": np.array([70_000, 2], np.uint32),
+        "bin_counts": np.full((2, MOST_BINS), [[255], [0]], np.uint8),
         "pixel": np.array([0, 1], np.uint32),
         "hull_segments": np.array([2, 0], np.uint32),
         "hull_length": np.array([69_000, 900], np.uint32),
@@ -210,6 +211,7 @@ def test_lists_longer_than_65535_need_wider_columns(tmp_path: Path) -> None:
     write_columns(tmp_path / "wide", columns, {**view, "fragments": 70_002})
     shard = read_shard(tmp_path / "wide")
     np.testing.assert_array_equal(shard.n, [70_000, 2])
+    assert shard.bin_counts.tolist() == [[255] * MOST_BINS, [0] * MOST_BINS]
     np.testing.assert_array_equal(shard.hull_k, [0, 69_000, 69_900])
     np.testing.assert_array_equal(shard.hull_error, np.array([0.5, 0.25, 0.0], np.float32))
     np.testing.assert_array_equal(shard.hull_offsets, [0, 3, 3])

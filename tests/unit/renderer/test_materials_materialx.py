@@ -13,6 +13,7 @@ from renderer.usd.coordinates import place2d, tiling, transform2d
 from renderer.usd.materialx import referenced_files
 from renderer.usd.networks import category_of
 from schemas.colour import encode_gamma2
+from schemas.glass import DEFAULT_GLASS, GlassReading
 from schemas.scene import SceneArrays
 
 DOCUMENT = """<?xml version="1.0"?>
@@ -32,14 +33,16 @@ def surface(kind: str, *fields: str) -> str:
     return f'<{kind} name="s" type="surfaceshader">{"".join(fields)}</{kind}>'
 
 
-def load(folder: Path, body: str, attributes: str = "", alpha: float | None = None) -> SceneArrays:
+def load(
+    folder: Path, body: str, attributes: str = "", alpha: float | None = None, glass: GlassReading = DEFAULT_GLASS
+) -> SceneArrays:
     """A card bound to material M of a document with that body."""
     (folder / "m.mtlx").write_text(DOCUMENT % (attributes, body))
     card = Card(folder)
     card.stage.RemovePrim("/Looks")
     looks = card.stage.DefinePrim("/Looks", "Scope")
     looks.GetReferences().AddReference("./m.mtlx", "/MaterialX/Materials")
-    return card.load(alpha)
+    return card.load(alpha, glass)
 
 
 def rgba(*linear: float) -> list[int]:
@@ -86,7 +89,7 @@ def rgba(*linear: float) -> list[int]:
     ],
 )
 def test_surfaces_of_a_document(tmp_path: Path, kind: str, fields: list[str], wanted: tuple[float, ...]) -> None:
-    scene = load(tmp_path, surface(kind, *fields))
+    scene = load(tmp_path, surface(kind, *fields), glass="plain")
     np.testing.assert_allclose(scene.colours[0].astype(int), rgba(*wanted), atol=1)
     assert scene.warnings == ()
 
@@ -139,11 +142,11 @@ def test_a_missing_image_is_its_default_and_named(tmp_path: Path) -> None:
     assert any("(gone.png)" in w for w in scene.warnings)
 
 
-def test_textured_transmission_is_an_opacity(tmp_path: Path) -> None:
+def test_textured_transmission_is_an_opacity_where_glass_is_read_plainly(tmp_path: Path) -> None:
     save(tmp_path / "a.png", [[(0, 0, 0, 255), (255, 0, 0, 255)]])
     image = '<image name="i" type="float">' + field("file", "filename", "a.png", colorspace="raw") + "</image>"
     glass = '<input name="transmission" type="float" nodename="i"/>'
-    (batch,) = load(tmp_path, image + surface("standard_surface", glass)).batches
+    (batch,) = load(tmp_path, image + surface("standard_surface", glass), glass="plain").batches
     assert batch.layer == "mixed"
     assert (batch.opacity_scale, batch.opacity_bias) == (-0.75, 1.0)
 

@@ -267,7 +267,9 @@ def test_materialx_documents_give_colour_and_see_through_glass(tmp_path: Path) -
     assert scene.textures[scene.batches[0].colour_texture].name == "a.png"
     assert scene.warnings == ()
     glass = load_scene(stage(tmp_path, (MESH % "").replace("</Looks/M>", "</Looks/Glass>") + looks))
-    np.testing.assert_array_equal(glass.colours[0], [128, 255, 0, 64])
+    # All of the light goes through, with that tint.
+    np.testing.assert_array_equal(glass.colours[0], [128, 255, 0, 0])
+    assert glass.batches[0].reflectance == pytest.approx((0.04, 1.0))
     broken = tmp_path / "m.mtlx"
     broken.write_text("<materialx>")
     assert any("/Looks/M" in w for w in load_scene(stage(tmp_path, MESH % "" + looks)).warnings)

@@ -19,6 +19,7 @@ from services.options import (
     chosen_tail,
     default_holdout,
     parse_budgets,
+    parse_glass,
     parse_size,
     parse_tail,
     parse_weights,
@@ -192,6 +193,7 @@ def test_texts_are_parsed__yes() -> None:
     assert parse_size("1430x960") == (1430, 960)
     assert parse_tail("paper") == "paper"
     assert parse_weights("flip") == "flip"
+    assert parse_glass("plain") == "plain"
 
 
 @pytest.mark.parametrize("text", ["", "1430", "1430x", "x960", "1430 x 960x2", "-1x2", "1.5x2"])
@@ -205,5 +207,7 @@ def test_other_texts_are_parsed__no() -> None:
         parse_budgets("1;2")
     with pytest.raises(Problem, match="no tail 'dense'"):
         parse_tail("dense")
+    with pytest.raises(Problem, match="no reading of glass 'thick'"):
+        parse_glass("thick")
     with pytest.raises(Problem, match="no weights 'ssim'"):
         parse_weights("ssim")

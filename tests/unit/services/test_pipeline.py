@@ -126,6 +126,18 @@ def test_views_without_fragments_and_opaque_scenes_are_skipped_and_counted() -> 
     assert [task.name for task in runner.of("label")] == ["knots view1", "town view0", "town view1"]
 
 
+def test_what_a_picture_lacks_is_said_of_each_scene_in_a_few_lines() -> None:
+    runner = TableRunner()
+    runner.warnings = {"town": [f"reason {i}: /P" for i in range(9)], "knots": ["lights are not used: /Sun"]}
+    said: list[str] = []
+    runner.progress.note = said.append  # type: ignore[method-assign]
+    run(runner, spec())
+    assert [line for line in said if "knots" in line] == ["warning: knots: lights are not used: /Sun"]
+    town = [line for line in said if "town" in line]
+    assert town[:-1] == [f"warning: town: reason {i}: /P" for i in range(6)]
+    assert town[-1] == "warning: town: and 3 more", "the files of a job are not on this machine"
+
+
 @pytest.mark.parametrize("how", ["opaque", "empty"])
 def test_a_held_out_scene_with_nothing_transparent_is_not_scored_and_that_is_said(how: str) -> None:
     runner = TableRunner()
@@ -347,3 +359,15 @@ def test_what_does_not_change_a_picture_does_not_change_its_address() -> None:
     for stage in ("scene", "render"):
         assert [task.artifact for task in one.of(stage)] == [task.artifact for task in other.of(stage)]
     assert one.of("label")[0].artifact != other.of("label")[0].artifact
+
+
+def test_the_reading_of_glass_reaches_every_task_that_loads_a_scene_and_the_bundle() -> None:
+    usual, plain = TableRunner(), TableRunner()
+    run(usual, spec())
+    run(plain, spec(glass="plain"))
+    for runner, wanted in ((usual, "fresnel"), (plain, "plain")):
+        read = [task for stage in ("scene", "render", "evaluate") for task in runner.of(stage)]
+        assert {task.params["glass"] for task in read} == {wanted}
+    (exported,) = plain.of("export")
+    assert exported.params["settings"]["glass"] == "plain"
+    assert "glass" not in usual.of("export")[0].params["settings"]

@@ -26,6 +26,7 @@ from schemas.bundle import (
     Provenance,
     TailSpec,
     file_spec,
+    gain_outputs,
     load_manifest,
 )
 from schemas.problem import Problem
@@ -64,11 +65,10 @@ def test_what_is_written_is_read_back(folder: Path) -> None:
     bundle, original = load_bundle(folder), random_weights(1, NAMES, (8,))
     assert bundle.manifest.name == "glass"
     assert bundle.manifest.feature_names == NAMES
-    assert bundle.manifest.weight_count == 8 * 4 + 8 + 2 * 8 + 2
+    assert bundle.manifest.weight_count == 8 * 4 + 8 + 13 * 8 + 13
     assert bundle.manifest.parity.count == 500
     features = real_features(100, 2)
-    for read, written in zip(bundle.weights.predict(features), original.predict(features), strict=True):
-        np.testing.assert_array_equal(read, written)
+    np.testing.assert_array_equal(bundle.weights.run(features), original.run(features))
 
 
 def test_the_bundle_holds_nothing_else(folder: Path) -> None:
@@ -172,9 +172,10 @@ def _set(manifest: dict[str, object], key: str, value: object) -> None:
         (lambda m: m.pop("onnx"), "onnx: Field required"),
         (lambda m: m.pop("outputs"), "outputs: Field required"),
         (lambda m: m["parity"].pop("torch_ubo"), "torch_ubo: Field required"),
-        (lambda m: _set(m, "outputs", ["a"]), "does not answer a"),
-        (lambda m: _set(m, "outputs", ["b", "a"]), "does not answer b, a"),
-        (lambda m: _set(m, "head", "importance"), "does not answer a, b"),
+        (lambda m: _set(m, "outputs", ["a", "b"]), "does not answer a, b"),
+        (lambda m: _set(m, "outputs", list(gain_outputs(8))), "does not answer gain_0"),
+        (lambda m: m["tail"].update(name="binned-8"), "does not answer gain_0"),
+        (lambda m: _set(m, "head", "importance"), "does not answer gain_0"),
         (lambda m: m.update(head="importance", outputs=["importance"]), "layers do not follow"),
         (lambda m: m["files"]["model.onnx"].update(bytes=1 << 40), "bytes"),
     ],
@@ -234,7 +235,7 @@ def test_no_bundle_is_left_when_the_forms_differ(
 
 def _off_by_little(weights: Weights) -> dict[str, bytes]:
     forms = float_forms(weights)
-    return {**forms, GLSL: forms[GLSL].replace(b"return vec2(a,", b"return vec2(a + 1e-3,")}
+    return {**forms, GLSL: forms[GLSL].replace(b"](gain_0,", b"](gain_0 + 1e-3,")}
 
 
 def test_manifest_survives_its_own_json(folder: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +17,10 @@ from labeller.hull import lower_hulls
 from labeller.shards import read_shard, write_shard
 from renderer.features import FEATURES
 from schemas.problem import Problem
+from schemas.tail import DEFAULT_TAIL, TAILS
+from trainer.config import TrainConfig
 from trainer.dataset import GROUP, Drawing, ViewData, load_shards, make_view, normalisation, sample_batch
+from trainer.heads import HEADS
 from trainer.segments import SEGMENTS
 
 
@@ -26,6 +30,8 @@ def view_of(hulls: list[tuple[list[int], list[float]]], prices: tuple[float, flo
         "one",
         features=np.zeros((len(hulls), len(FEATURES)), np.float32),
         n=np.array([max(k, default=2) + 1 for k, _ in hulls], np.int32),
+        tail=DEFAULT_TAIL,
+        bin_counts=np.zeros((len(hulls), TAILS[DEFAULT_TAIL].bins), np.uint8),
         hull=(
             offsets,
             np.concatenate([np.array(k, np.int32) for k, _ in hulls]),
@@ -80,15 +86,38 @@ def test_a_batch_is_the_same_for_the_same_seed_and_differs_by_step() -> None:
     assert not np.array_equal(first.log_lambda, other.log_lambda)
 
 
-def test_a_batch_holds_the_rows_hulls() -> None:
+def plain_slopes(view: ViewData, row: int) -> list[float]:
+    """What each fragment of each bin gains, fragment by fragment."""
+    part = slice(view.offsets[row], view.offsets[row + 1])
+    gains = [
+        float(slope) for slope, n in zip(view.slopes[part], view.lengths[part], strict=True) for _ in range(int(n))
+    ]
+    found, before = [], 0
+    for own in view.bin_counts[row].tolist():
+        of_bin = gains[before : before + own]
+        assert len(set(of_bin)) <= 1, "a hull has no vertex within a bin"
+        found.append(of_bin[0] if of_bin else math.nan)
+        before += own
+    return found
+
+
+def test_a_batch_holds_what_the_rows_bins_gain() -> None:
     view = random_view("a", 3)
     batch = sample_batch([view], list(range(len(FEATURES))), (0, 0), GROUP)
     for i in range(GROUP):
         row = np.flatnonzero((view.features == batch.features[i]).all(axis=1))[0]
-        part = slice(view.offsets[row], view.offsets[row + 1])
-        np.testing.assert_array_equal(batch.slopes[i, : len(view.slopes[part])], view.slopes[part])
-        assert batch.lengths[i].sum() == view.lengths[part].sum()
-        assert batch.n[i] == view.n[row]
+        np.testing.assert_array_equal(batch.counts[i], view.bin_counts[row])
+        expected = np.array(plain_slopes(view, row), np.float32)
+        known = ~np.isnan(expected)
+        np.testing.assert_array_equal(batch.slopes[i][known], expected[known])
+        assert (batch.slopes[i][~known & (batch.counts[i] > 0)] == 0.0).all(), "behind the hull's end"
+        np.testing.assert_array_equal(batch.prior[i], view.prior(np.array([row]))[0])
+
+
+def test_a_network_is_trained_for_one_tail() -> None:
+    other = replace(random_view("b", 2), tail="binned-8")
+    with pytest.raises(Problem, match="binned-12, binned-8: a network is trained for one"):
+        HEADS["bin-gains"].network([random_view("a", 1), other], TrainConfig())
 
 
 def test_assets_are_drawn_equally_often_however_many_views_they_have() -> None:

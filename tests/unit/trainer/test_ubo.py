@@ -45,7 +45,7 @@ def test_the_block_holds_what_the_page_says(inputs: int, hidden: tuple[int, ...]
     x = np.pad(features[:, weights.columns].astype(np.float64), ((0, 0), (0, -inputs % 4)))
     mean = words.take(quads, "<f4")
     x = np.clip((x - mean) / words.take(quads, "<f4"), -FEATURE_LIMIT, FEATURE_LIMIT)
-    for number, size in enumerate((*hidden, 2)):
+    for number, size in enumerate((*hidden, len(weights.outputs))):
         last = number == len(hidden)
         outputs = -(-size // 4)
         total = np.tile(words.take(outputs, "<f4"), (len(x), 1))
@@ -56,7 +56,7 @@ def test_the_block_holds_what_the_page_says(inputs: int, hidden: tuple[int, ...]
         x = total if last else np.maximum(total, 0.0)
     assert words.left == 0
     tolerance = 1e-2 if half else 1e-5
-    answers = activate(weights.outputs, x[:, :2].astype(np.float32))
+    answers = activate(weights.outputs, x[:, : len(weights.outputs)].astype(np.float32))
     np.testing.assert_allclose(answers, weights.run(features), rtol=tolerance, atol=tolerance)
     declared = re.search(r"diaphane_weights\[(\d+)\]; \}", ubo_source(weights, half=half))
     assert declared is not None
