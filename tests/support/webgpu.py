@@ -37,9 +37,9 @@ PREDICT = (
     for (var i = 0u; i < DIAPHANE_FEATURES; i++) {
         x[i] = inputs[row * DIAPHANE_FEATURES + i];
     }
-    var found = diaphane_predict(x);
+    var answer = diaphane_predict(x);
     for (var i = 0u; i < DIAPHANE_OUTPUTS; i++) {
-        outputs[row * DIAPHANE_OUTPUTS + i] = found.y[i];
+        outputs[row * DIAPHANE_OUTPUTS + i] = answer.y[i];
     }
 }
 """
