@@ -87,7 +87,7 @@ def corrected(
     correction, frames = (np.where(goes_on, field, 0) for field in (before.correction, before.frames))
 
     given = correction / PRICE_STEPS
-    last = np.take_along_axis(ranks.astype(np.int64), np.maximum(before.cut - 1, 0)[:, None], axis=1)[:, 0]
+    last = np.take_along_axis(ranks.astype(np.int64), np.clip(before.cut, 1, ranks.shape[1])[:, None] - 1, axis=1)[:, 0]
     price = last / PRICE_STEPS + LEAST_PRICE
     wrong = np.clip(before.seen / SEEN_STEPS + SEEN_LEAST + price - given, -MOST_WRONG, MOST_WRONG)
     moved = np.floor((given + wrong / (frames + 2)) * PRICE_STEPS + 0.5)

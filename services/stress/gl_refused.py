@@ -47,7 +47,8 @@ def rows() -> Iterator[Finding]:
 
 
 def _refused(folder: Path, prim: str) -> bool:
-    path = folder / "stage.usda"
+    # Each at a path of its own: a layer that is still open is not read again.
+    path = folder / f"{len(list(folder.iterdir()))}.usda"
     path.write_text(f"{_HEAD}{prim}}}\n", encoding="utf-8")
     try:
         load_scene(path)

@@ -77,9 +77,8 @@ def make_bundle(dump: FragmentDump, gl: moderngl.Context, folder: Path, tail: Ta
         provenance=Provenance(scenes={}, code_version="0", seed=0, machine="test"),
         evaluation={},
     )
-    export_bundle(
-        folder, random_weights(11, FEATURES, (8,)), description, derive(gather(dump, tail))[dump.counts > 0], gl
-    )
+    network = random_weights(11, FEATURES, (8,), tail=tail)
+    export_bundle(folder, network, description, derive(gather(dump, tail))[dump.counts > 0], gl)
     return folder
 
 

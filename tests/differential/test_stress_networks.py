@@ -30,7 +30,7 @@ def rows() -> list[Row]:
 
 def test_every_form_is_within_its_bound(rows: list[Row]) -> None:
     assert [row for row in rows if not (isinstance(row, Finding) and row.ok)] == []
-    assert {row.path for row in rows} == {*NEEDED, "predict.counts", "features.float16"}
+    assert {row.path for row in rows} == {*NEEDED, "predict.ranks", "features.float16"}
     assert all(row.bound == BOUNDS[row.path].value for row in rows if isinstance(row, Finding))
 
 
@@ -67,7 +67,7 @@ def refused() -> dict[str, Finding]:
 
 def test_every_entry_point_refuses_what_is_not_finite(refused: dict[str, Finding]) -> None:
     assert [row for row in refused.values() if not row.ok] == []
-    assert len(refused) == 15
+    assert len(refused) == 10
 
 
 def test_an_entry_point_that_takes_nan_is_a_violation() -> None:

@@ -20,6 +20,7 @@ from labeller.shard_file import Columns, open_columns, write_columns
 from labeller.shards import Shard, read_rows, read_shard
 from renderer.features import FEATURES
 from schemas.problem import Problem
+from schemas.tail import MOST_BINS
 
 ROWS = 150
 
@@ -53,7 +54,8 @@ def tables(draw: st.DrawFn) -> tuple[Columns, list[tuple[list[int], list[float]]
     lengths = [b - a for ks, _ in hulls for a, b in pairwise(ks)]
     columns: Columns = {
         "features": draw(hnp.arrays(np.float32, (rows, len(FEATURES)), elements=finite)),
-        "n": np.array([draw(st.integers(max([2, *ks]), 65_535)) for ks, _ in hulls], dtype=np.uint16),
+        "n": np.array([draw(st.integers(max([2 * MOST_BINS, *ks]), 65_535)) for ks, _ in hulls], dtype=np.uint16),
+        "bin_counts": draw(hnp.arrays(np.uint8, (rows, MOST_BINS), elements=st.integers(0, 2))),
         "pixel": np.arange(rows, dtype=np.uint32) * 7,
         "hull_segments": np.array([max(len(ks) - 1, 0) for ks, _ in hulls], dtype=np.uint16),
         "hull_length": np.array(lengths, dtype=np.uint16),
@@ -74,6 +76,7 @@ def test_what_is_written_is_read(
         shard = read_shard(path)
     np.testing.assert_array_equal(shard.features, columns["features"])
     np.testing.assert_array_equal(shard.n, columns["n"])
+    np.testing.assert_array_equal(shard.bin_counts, columns["bin_counts"])
     np.testing.assert_array_equal(shard.pixel, columns["pixel"])
     assert len(shard.hull_offsets) == len(hulls) + 1
     for row, (ks, errors) in enumerate(hulls):
@@ -86,7 +89,7 @@ def test_what_is_written_is_read(
 def _slice(shard: Shard, start: int, stop: int) -> tuple[np.ndarray[Any, Any], ...]:
     first, last = shard.hull_offsets[start], shard.hull_offsets[stop]
     return (
-        *(shard.features[start:stop], shard.n[start:stop], shard.pixel[start:stop]),
+        *(shard.features[start:stop], shard.n[start:stop], shard.bin_counts[start:stop], shard.pixel[start:stop]),
         shard.hull_offsets[start : stop + 1] - first,
         *(shard.hull_k[first:last], shard.hull_error[first:last]),
     )

@@ -37,14 +37,14 @@ PREDICT = (
     for (var i = 0u; i < DIAPHANE_FEATURES; i++) {
         x[i] = inputs[row * DIAPHANE_FEATURES + i];
     }
-    let y = diaphane_predict(x);
+    var answer = diaphane_predict(x);
     for (var i = 0u; i < DIAPHANE_OUTPUTS; i++) {
-        outputs[row * DIAPHANE_OUTPUTS + i] = y[i];
+        outputs[row * DIAPHANE_OUTPUTS + i] = answer.y[i];
     }
 }
 """
 )
-"""What calls a bundle's WGSL; replace `y[i]` by `y` for one output."""
+"""What calls a bundle's WGSL."""
 
 
 @dataclass(frozen=True)

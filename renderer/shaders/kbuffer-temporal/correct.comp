@@ -13,7 +13,7 @@ uniform int still;  // whether the camera has not moved
 // A correction with what was seen: each frame moves it by a smaller share of what it is wrong by, so that it settles.
 int learnt(uint word, int correction, uint frames, PixelBins ranks) {
     precise float given = float(correction) / float(PRICE_STEPS);
-    precise float price = float(of_bin(ranks, int(seen_cut(word)) - 1)) / float(PRICE_STEPS) + float(LEAST_PRICE);
+    precise float price = float(of_bin(ranks, min(int(seen_cut(word)), BINS) - 1)) / float(PRICE_STEPS) + float(LEAST_PRICE);
     precise float wrong = clamp(seen_gain(word) + price - given, -float(MOST_WRONG), float(MOST_WRONG));
     precise float steps = (given + wrong / float(frames + 2u)) * float(PRICE_STEPS);
     return clamp(int(floor(steps + 0.5)), -LARGEST, LARGEST);

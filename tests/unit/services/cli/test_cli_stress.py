@@ -62,10 +62,10 @@ def test_a_fill_that_ignores_its_weights_is_a_violation(monkeypatch: pytest.Monk
     assert run(["stress", "--quick", "--only", "fill.budget"]) == ExitCode.CHECK_FAILED
 
 
-def test_prices_of_other_curves_are_a_violation(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = fills.solve_lambda
-    monkeypatch.setattr(fills, "solve_lambda", lambda a, b, *rest: right(a[::-1], b, *rest))
-    assert run(["stress", "--quick", "--only", "fill.lambda"]) == ExitCode.CHECK_FAILED
+def test_ranks_of_other_prices_are_a_violation(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = fills.ranks_of
+    monkeypatch.setattr(fills, "ranks_of", lambda prices, counts: right(prices[::-1], counts))
+    assert run(["stress", "--quick", "--only", "fill.cuts"]) == ExitCode.CHECK_FAILED
 
 
 def test_an_exception_is_a_row_and_status_1(
@@ -99,7 +99,7 @@ def test_an_unknown_path_is_a_usage_error() -> None:
 def test_the_seed_decides_everything(capsys: pytest.CaptureFixture[str]) -> None:
     told = []
     for seed in ("3", "3", "4"):
-        run(["stress", "--quick", "--only", "csr", "--only", "fill.lambda", "--json", "--seed", seed])
+        run(["stress", "--quick", "--only", "csr", "--only", "fill.budget", "--json", "--seed", seed])
         told.append(json.loads(capsys.readouterr().out))
     assert told[0] == told[1] != told[2]
 

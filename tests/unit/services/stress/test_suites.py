@@ -28,7 +28,7 @@ def test_every_path_with_a_bound_belongs_to_a_suite() -> None:
     [
         ((), [suite.name for suite in SUITES]),
         (("fills",), ["fills"]),
-        (("fill.lambda",), ["fills"]),
+        (("fill.budget",), ["fills"]),
         (("csr", "greedy"), ["curves", "allocations"]),
         (("abuffer-list",), ["gl"]),
         (("predict.onnx",), ["predictors"]),
