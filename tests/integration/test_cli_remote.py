@@ -314,7 +314,20 @@ def test_all_options_of_a_job_arrive(server: FakeServer, folder: Path) -> None:
     camera = {"eye": [0, 0, 5], "target": [0, 0, 0], "up": [0, 1, 0], "fov": 45}
     (folder / "views.json").write_text(json.dumps({"scenes": [{"main": "a.usdz", "views": [camera]}]}))
     options = ["--name", "glass", "--scene", "a.usdz", "--holdout", "b.usdz", "--budgets", "4,1", "--alpha", "0.33"]
-    options += ["--views-per-scene", "2", "--size", "64x48", "--tail", "binned-16", "--g", "0.5", "--seed", "7"]
+    options += [
+        "--glass",
+        "plain",
+        "--views-per-scene",
+        "2",
+        "--size",
+        "64x48",
+        "--tail",
+        "binned-16",
+        "--g",
+        "0.5",
+        "--seed",
+        "7",
+    ]
     options += [
         "--network",
         "tiny",
@@ -348,6 +361,7 @@ def test_all_options_of_a_job_arrive(server: FakeServer, folder: Path) -> None:
         "model": None,
         "budgets": [1.0, 4.0],
         "alpha": 0.33,
+        "glass": "plain",
         "views_per_scene": 2,
         "width": 64,
         "height": 48,
