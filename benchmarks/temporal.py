@@ -210,7 +210,7 @@ def _number(value: float | None) -> str:
 
 def _parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--bundle", type=Path, required=True, help="Folder of a bundle with gain curves.")
+    parser.add_argument("--bundle", type=Path, required=True, help="Folder of a bundle of the head bin-gains.")
     parser.add_argument("--scenes", type=Path, default=SHARED, help="Folder with MANIFEST.json.")
     parser.add_argument("--only", default=",".join(SCENES), help="Names of scenes, with commas between.")
     add_outputs(parser, required=True)

@@ -65,8 +65,8 @@ class Suite:
         yield from worst_rows(self._step("predict.glsl", "adverse features", adverse))
         lists = partial(gl_moment.rows, self._ctx, self._options, self._driver)
         yield from worst_rows(self._step("moment.arithmetic", "lists", lists))
-        curves = partial(gl_allocation.rows, self._ctx, self._options, self._driver)
-        yield from worst_rows(self._step("allocation", "gain curves", curves))
+        ranks = partial(gl_allocation.rows, self._ctx, self._options, self._driver)
+        yield from worst_rows(self._step("allocation", "ranks", ranks))
 
     def _scenery(self, scenery: Scenery, networks: gl_network.Networks) -> Iterator[Row]:
         self._say({"at": f"upload, {scenery.name}"})
