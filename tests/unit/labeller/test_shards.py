@@ -23,6 +23,7 @@ from labeller.hull import lower_hulls
 from labeller.rules import allocate_curves
 from labeller.shard_file import open_columns, write_columns
 from labeller.shards import Shard, read_rows, read_shard, write_shard
+from renderer.depth_bins import bin_counts
 from renderer.features import FEATURES, derive, gather
 from schemas.problem import ExitCode, Problem
 from schemas.tail import DEFAULT_TAIL, MOST_BINS
@@ -50,6 +51,8 @@ def test_rows_hold_the_hulls_and_features_of_their_pixels(shard: Shard) -> None:
     assert shard.features.shape == (len(shard.n), len(FEATURES))
     assert np.array_equal(shard.features, features[shard.pixel])
     assert np.array_equal(shard.n, DUMP.counts[shard.pixel])
+    assert np.array_equal(shard.bin_counts, bin_counts(DUMP, DEFAULT_TAIL)[shard.pixel])
+    assert np.array_equal(shard.bin_counts.sum(axis=1), shard.n), "no bin is full"
     for row, p in enumerate(shard.pixel):
         mine = slice(shard.hull_offsets[row], shard.hull_offsets[row + 1])
         theirs = slice(HULLS.offsets[p], HULLS.offsets[p + 1])
@@ -231,6 +234,7 @@ def test_lists_longer_than_65535_need_wider_columns(tmp_path: Path) -> None:
         ("hull_segments", 3, 60_000, "segments that they say"),
         ("n", 0, 0, "counts that the view"),
         ("n", slice(None), 65_535, "counts that the view"),
+        ("bin_counts", (0, 0), 200, "more fragments in bins than in their pixel"),
         ("pixel", -1, 40 * 30, "pixels that the view"),
         ("pixel", 1, 0, "pixels that the view"),
         ("pixel", -1, 2**32 - 1, "pixels that the view"),

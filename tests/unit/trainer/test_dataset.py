@@ -21,7 +21,7 @@ from schemas.tail import DEFAULT_TAIL, TAILS
 from trainer.config import TrainConfig
 from trainer.dataset import GROUP, Drawing, ViewData, load_shards, make_view, normalisation, sample_batch
 from trainer.heads import HEADS
-from trainer.segments import SEGMENTS
+from trainer.segments import SEGMENTS, bin_slopes
 
 
 def view_of(hulls: list[tuple[list[int], list[float]]], prices: tuple[float, float] = (-9.0, -1.0)) -> ViewData:
@@ -112,6 +112,26 @@ def test_a_batch_holds_what_the_rows_bins_gain() -> None:
         np.testing.assert_array_equal(batch.slopes[i][known], expected[known])
         assert (batch.slopes[i][~known & (batch.counts[i] > 0)] == 0.0).all(), "behind the hull's end"
         np.testing.assert_array_equal(batch.prior[i], view.prior(np.array([row]))[0])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_bin_gains_what_the_segment_of_its_middle_does(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    segments = [int(number) for number in rng.integers(0, 6, 30)]
+    offsets = np.concatenate([[0], np.cumsum(segments)]).astype(np.int64)
+    slopes = np.concatenate([-np.sort(-rng.random(number)) for number in segments]).astype(np.float32)
+    lengths = rng.integers(1, 9, len(slopes)).astype(np.float32)
+    # Segments of simplified hulls end within bins, and lists go on behind their hulls.
+    rows, counts = rng.permutation(30), rng.integers(0, 7, (30, 8)).astype(np.float32)
+    found = np.full((30, 8), np.nan, np.float32)
+    bin_slopes(offsets, slopes, lengths, rows, counts, found)
+    for i, row in enumerate(rows):
+        part = slice(offsets[row], offsets[row + 1])
+        # Two entries for each fragment: the middle of a bin is between fragments, or of one.
+        halves = [slope for slope, n in zip(slopes[part], lengths[part], strict=True) for _ in range(2 * int(n))]
+        for b in range(8):
+            middle = int(2 * counts[i, :b].sum() + counts[i, b])
+            assert found[i, b] == (halves[middle] if middle < len(halves) else 0.0)
 
 
 def test_a_network_is_trained_for_one_tail() -> None:

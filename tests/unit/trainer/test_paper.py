@@ -120,6 +120,6 @@ def test_rows_without_depths_are_refused() -> None:
         train([random_view("a", 1)], (), TrainConfig.of("paper", steps=1))
 
 
-def test_a_gain_curve_is_no_beginning_of_an_importance(views: list[ViewData]) -> None:
+def test_gains_of_bins_are_no_beginning_of_an_importance(views: list[ViewData]) -> None:
     with pytest.raises(Problem, match="cannot be trained as paper"):
         train(views, (), TrainConfig.of("paper", steps=1), start=random_weights(0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import subprocess
 import sys
@@ -50,6 +51,19 @@ def test_training_comes_nearer_to_the_optimum(data: tuple[list[ViewData], list[V
     untrained = train(*data, CONFIG.model_copy(update={"steps": 1, "validate_every": 1}))
     excess = [geometric_mean(evaluate(found.weights, data[1])) - 1.0 for found in (trained, untrained)]
     assert excess[0] < 0.7 * excess[1]
+
+
+def test_a_network_learns_more_than_the_tail_tells_by_itself() -> None:
+    views, unseen = ([random_view(f"view {i}", i, alpha=EVEN) for i in seeds] for seeds in (range(1, 9), range(77, 81)))
+    trained = train(views, (), CONFIG.model_copy(update={"steps": 800, "validate_every": 800})).weights
+    constant = [(np.zeros_like(weight), np.zeros_like(bias)) for weight, bias in trained.layers]
+    constant[-1][1][-1] = math.log(math.expm1(1.0))
+    prior = replace(trained, layers=tuple(constant))
+    answers = prior.run(unseen[0].features)
+    assert not answers[:, :-1].any(), "no bin is above what the tail tells"
+    np.testing.assert_allclose(answers[:, -1], 1.0, rtol=1e-6)
+    excess = [geometric_mean(evaluate(weights, unseen)) - 1.0 for weights in (trained, prior)]
+    assert excess[0] < 0.8 * excess[1]
 
 
 def test_the_same_seed_gives_the_same_weights(data: tuple[list[ViewData], list[ViewData]], result: TrainResult) -> None:
