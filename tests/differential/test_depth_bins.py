@@ -248,7 +248,7 @@ def test_sums_of_luma_are_those_of_the_dump_to_the_unit(frame: Frame, dump: Frag
 def test_a_network_reads_what_the_dump_says(
     frame: Frame, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, tail: TailName, names: tuple[str, ...]
 ) -> None:
-    network, features = random_weights(11, names), derive(gather(dump, tail))
+    network, features = random_weights(11, names, tail=tail), derive(gather(dump, tail))
     export_random(tmp_path, network, features[dump.counts > 0], gl, tail)
     deep, pixels = KBufferDeep(tmp_path), np.flatnonzero(dump.counts).astype(np.uint32)
     found, expected = deep.features(frame, pixels), features[pixels][:, network.columns]

@@ -106,7 +106,7 @@ def test_every_fragment_of_a_sphere_has_the_alpha_of_its_interpolated_normal(gl:
 
 
 def test_the_core_the_tail_and_the_dump_have_the_same_glass(gl: moderngl.Context) -> None:
-    frame = Frame(GpuScene(gl, with_glass(shells(subdivisions=1))), VIEW, 96, 72)
+    frame = Frame(GpuScene(gl, with_glass(shells(subdivisions=1))), VIEW, 96, 72, float_sums=True)
     dump = capture(frame).dump
     k = np.minimum(np.arange(dump.pixels) % 5, dump.counts).astype(np.int32)
     for chain in ("two-pass", "one-pass") if _one_pass(gl) else ("two-pass",):

@@ -107,7 +107,7 @@ def test_ranks_are_those_of_numpy(
     assert apart.max() <= 1
     assert (apart > 0).mean() < 2e-3
     seen = expected[counts[occupied] > 0]
-    assert 0 < np.percentile(seen, 5) < np.percentile(seen, 50) < 255
+    assert ((seen > 0) & (seen < 255)).mean() > 0.2, "most of the rest is worth nothing to a random network"
 
 
 @pytest.mark.parametrize("tail", BINNED_TAILS)
