@@ -12,8 +12,8 @@ from services.stress.findings import Finding, NotRun, Options, Row
 from services.stress.gl_drivers import ZINK
 
 PASSES = (
-    *("capture.bits", "range", "bins.kept", "bins.counts", "bins.colours"),
-    *("features", "features.kept", "features.half", "predict.glsl", "allocation"),
+    *("capture.bits", "range", "bins.kept", "bins.counts"),
+    *("features", "features.kept", "predict.glsl", "allocation"),
     *("kbuffer-deep.F and K", "kbuffer-deep.overflowing network.F and K"),
 )
 
