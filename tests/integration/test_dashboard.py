@@ -276,8 +276,8 @@ def test_pages_with_data(admin: Visitor, shown: Shown) -> None:
     assert len(re.findall(r'class="worse"', model)) == 1
     assert "1.20 times the version before" in model
     assert model.count("<svg") > 3
-    assert "<dd>18, " in model  # weights: 1 -> 4 -> 2 with biases
-    assert "12 a pixel" in model
+    assert "<dd>73, " in model  # weights: 1 -> 4 -> 13 with biases
+    assert "56 a pixel" in model
     assert "Commercial use is NOT CLEARED: 1 of 1 training scenes have no licence" in model
     assert '<pre class="card"># Model card: glass' in model
     scene = text[f"/scenes/{shown.scene}"]
