@@ -134,7 +134,7 @@ class KBufferDeep:
             with timing.readback(frame.ctx):
                 counts = binned.counts()
             occupied = np.flatnonzero(counts.any(axis=1)).astype(np.uint32)
-            ranks = self._ranks(binned, occupied, self._answers(frame, binned, occupied))
+            ranks = self._ranks(frame, binned, occupied, counts[occupied])
         with clock.measure("allocate"):
             found = solve_cuts(events_of(ranks, counts[occupied]), fragments)
             cut, k = np.zeros(frame.pixels, dtype=np.uint32), np.zeros(frame.pixels, dtype=np.int64)
@@ -142,12 +142,16 @@ class KBufferDeep:
             binned.write_cores(cut, offsets_of(k)[:-1].astype(np.uint32))
         return found.rank is None
 
-    def _ranks(self, binned: Binned, pixels: NDArray[np.uint32], answers: NDArray[np.float32]) -> NDArray[np.uint8]:
-        """Ranks of some pixels' bins, from what the network answers; what `prices.comp` does, in numpy."""
-        counts = binned.counts()[pixels]
+    def _ranks(
+        self, frame: Frame, binned: Binned, pixels: NDArray[np.uint32], counts: NDArray[np.uint8]
+    ) -> NDArray[np.uint8]:
+        """Ranks of the bins of some pixels, which hold `counts`: what `prices.comp` does, in numpy."""
+        answers = self._answers(frame, binned, pixels)
         if self.manifest.head == "importance":
             return ranks_of(importance_prices(answers[:, 0], counts), counts)
-        prior = prior_gains(*shares_of(binned.kept()[pixels], self._tail), counts, self._tail)
+        with timing.readback(frame.ctx):
+            kept = binned.kept()
+        prior = prior_gains(*shares_of(kept[pixels], self._tail), counts, self._tail)
         return ranks_of(gain_prices(answers, prior), counts)
 
     def predict(self, frame: Frame, pixels: NDArray[np.uint32]) -> NDArray[np.float32]:
