@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -70,11 +71,16 @@ def ctx(gl: moderngl.Context) -> Iterator[moderngl.Context]:
 
 
 @pytest.fixture(scope="session")
-def postgres(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Postgres]:
-    """The test session's PostgreSQL server."""
-    server = Postgres(tmp_path_factory.mktemp("postgres") / "server")
-    yield server
-    server.stop("immediate")
+def postgres() -> Iterator[Postgres]:
+    """The test session's PostgreSQL server.
+
+    Its data are not in pytest's own folder: every other session of pytest that begins closes that to all users but
+    root, and a server that cannot read its data ends.
+    """
+    with tempfile.TemporaryDirectory(prefix="postgres-") as folder:
+        server = Postgres(Path(folder) / "server")
+        yield server
+        server.stop("immediate")
 
 
 @pytest.fixture(params=["sqlite", "postgresql"])
