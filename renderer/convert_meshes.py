@@ -24,7 +24,7 @@ from PIL import Image as PillowImage
 from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdShade, UsdUtils, Vt
 from trimesh.resolvers import FilePathResolver
 
-from renderer.authoring import COORDINATES, Geometry, GlassLook, Look, vectors, write_material, write_mesh
+from renderer.authoring import COORDINATES, Geometry, GlassLook, Image, Look, vectors, write_material, write_mesh
 from renderer.authoring_glass import write_glass
 from renderer.convert_looks import Looks, is_invented
 from renderer.gltf_materials import document_of, glass_of, image_bytes, left_out, numbered, transmits
@@ -124,11 +124,12 @@ def _read(source: Path) -> trimesh.Scene:
         wanted: dict[str, Any] = {"process": False, **_READING.get(source.suffix.lower(), {})}
         # Textures of an OBJ are often beside its folder; glTF comes as one folder.
         resolver = FilePathResolver(str(source), allow_anywhere=source.suffix.lower() not in _GLTF)
-        document = document_of(source.read_bytes()) if source.suffix.lower() in _GLTF else {}
+        data = source.read_bytes() if source.suffix.lower() in _GLTF else b""
+        document = document_of(data) if source.suffix.lower() in _GLTF else {}
         needed = document.get("extensionsRequired", [])
         given: Any = source
         if transmits(document):
-            given, wanted["file_type"] = BytesIO(numbered(source.read_bytes())), source.suffix.lower()[1:]
+            given, wanted["file_type"] = BytesIO(numbered(data)), source.suffix.lower()[1:]
         scene: trimesh.Scene = trimesh.load_scene(given, resolver=resolver, **wanted)
     except Exception as error:  # every reader has its own kinds
         reason = (str(error).splitlines() or [type(error).__name__])[0]
@@ -171,6 +172,7 @@ class _Writer:
     folder: Path
     _stage: Usd.Stage = field(default_factory=Usd.Stage.CreateInMemory)
     _materials: dict[tuple[Look, GlassLook | None], UsdShade.Material] = field(default_factory=dict)
+    _transmissions: dict[int, Image] = field(default_factory=dict)
     _warnings: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -316,9 +318,12 @@ class _Writer:
         if not has_uv or not isinstance(texture, dict):
             return glass
         try:
-            data = image_bytes(self.source.read_bytes(), self.source.parent, texture["index"])
-            with PillowImage.open(BytesIO(data)) as image:
-                return replace(glass, image=self._looks.image(image))
+            number = texture["index"]
+            if number not in self._transmissions:  # meshes share a material: its image is read once
+                data = image_bytes(self.source.read_bytes(), self.source.parent, number)
+                with PillowImage.open(BytesIO(data)) as image:
+                    self._transmissions[number] = self._looks.image(image)
+            return replace(glass, image=self._transmissions[number])
         except (OSError, LookupError, TypeError, ValueError):
             self._warn("an image of the transmission cannot be read, and is left out")
             return glass

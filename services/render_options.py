@@ -20,7 +20,7 @@ from schemas.colour import srgb_to_linear
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 from schemas.tail import TailName
-from services.options import check_budget, check_bundle, check_steepness
+from services.options import check_budget, check_bundle, check_steepness, parse_glass
 
 RGB = tuple[float, float, float]
 
@@ -149,6 +149,28 @@ def parse_times(frames: str | None, default_time: bool) -> tuple[float, ...]:
     if default_time:
         return (math.nan,)
     return () if frames is None else parse_frames(frames)
+
+
+def loading(
+    alpha: float | None,
+    glass: str,
+    variant: Sequence[str] | None,
+    complexity: str | None,
+    refine: int | None,
+    time: float | None = None,
+) -> LoadOptions:
+    """How a scene is read, from what a command was given (`services.cli.scene_options`).
+
+    Raises:
+        Problem: A value is not possible.
+    """
+    return LoadOptions(
+        alpha=alpha,
+        glass=parse_glass(glass),
+        time=time,
+        variants=tuple(variant or ()),
+        refine=parse_refine(complexity, refine),
+    )
 
 
 def parse_refine(complexity: str | None, refine: int | None) -> int:

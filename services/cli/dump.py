@@ -49,20 +49,13 @@ def dump(
     as_json: JsonOption = False,
 ) -> None:
     """Write every transparent fragment of a view: a zarr group, and deep OpenEXR for other tools."""
-    from renderer.scene import LoadOptions
     from services.dumping import DumpOptions
     from services.dumping import dump as run
     from services.flags import parse_size
-    from services.options import parse_glass
-    from services.render_options import parse_background, parse_refine
+    from services.render_options import loading, parse_background
     from services.scene_warnings import said_warnings
 
-    load = LoadOptions(
-        alpha=alpha,
-        glass=parse_glass(glass),
-        variants=tuple(variant or ()),
-        refine=parse_refine(complexity, refine),
-    )
+    load = loading(alpha, glass, variant, complexity, refine)
     dumped = run(
         DumpOptions(
             file=file,

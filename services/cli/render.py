@@ -91,15 +91,14 @@ def render(
     as_json: JsonOption = False,
 ) -> None:
     """Render pictures by any technique within a budget, and say what each cost."""
-    from renderer.scene import LoadOptions
     from services.flags import parse_size
-    from services.options import parse_glass, parse_tail
+    from services.options import parse_tail
     from services.progress import make_progress
     from services.render_options import (
         RenderOptions,
+        loading,
         parse_background,
         parse_needs,
-        parse_refine,
         parse_techniques,
         parse_times,
         said_left_out,
@@ -118,12 +117,7 @@ def render(
         image_width=image_width,
         size=None if picture_size is None else parse_size(picture_size),
         frames=parse_times(frames, default_time),
-        load=LoadOptions(
-            alpha=alpha,
-            glass=parse_glass(glass),
-            variants=tuple(variant or ()),
-            refine=parse_refine(complexity, refine),
-        ),
+        load=loading(alpha, glass, variant, complexity, refine),
         background=parse_background(background),
         output=target,
         is_full=is_full,

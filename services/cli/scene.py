@@ -46,18 +46,10 @@ def inspect(
     from dataclasses import replace
 
     from renderer.inspection import inspect_scene
-    from renderer.scene import LoadOptions
     from services.local_scenes import as_usd
-    from services.options import parse_glass
-    from services.render_options import parse_refine
+    from services.render_options import loading
 
-    load = LoadOptions(
-        alpha=alpha,
-        glass=parse_glass(glass),
-        time=time,
-        variants=tuple(variant or ()),
-        refine=parse_refine(complexity, refine),
-    )
+    load = loading(alpha, glass, variant, complexity, refine, time)
     with as_usd(file) as usd:
         report = replace(inspect_scene(usd, load), file=str(file))
     if as_json:

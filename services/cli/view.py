@@ -102,15 +102,14 @@ def view(
     as_json: JsonOption = False,
 ) -> None:
     """Look at a scene with two techniques: pictures, differences, k, times, bytes and errors. H lists the keys."""
-    from renderer.scene import LoadOptions
     from services.flags import parse_size
-    from services.options import check_bundle, parse_glass, parse_tail
+    from services.options import check_bundle, parse_tail
     from services.progress import make_progress
     from services.render_options import (
         RenderOptions,
+        loading,
         parse_background,
         parse_needs,
-        parse_refine,
         parse_techniques,
     )
     from services.viewer.model import Service
@@ -138,12 +137,7 @@ def view(
             image_width=image_width,
             size=None if picture_size is None else parse_size(picture_size),
             frames=() if time is None else (time,),
-            load=LoadOptions(
-                alpha=alpha,
-                glass=parse_glass(glass),
-                variants=tuple(variant or ()),
-                refine=parse_refine(complexity, refine),
-            ),
+            load=loading(alpha, glass, variant, complexity, refine),
             background=parse_background(background),
             state=state,
         ),
