@@ -42,8 +42,8 @@ def page(found: Mapping[str, BenchResult], drawn: Mapping[tuple[str, str], str])
         "*certified optimum* is the least error that any allocation of the budget has with the technique's own tail. "
         "At *equal memory* each technique gets the total bytes that the fixed k-buffer takes with F = k WH, and F is "
         "what its own buffers leave of it (DHOIT, Eq. 1). Times are medians of repeats in which all techniques take "
-        "turns, on a host clock that waits for each pass; readbacks are a pass of their own; the spread is the "
-        "largest of (most - least) / median. Flicker is that of `diaphane bench`, over a path of "
+        "turns, by a clock that waits for each pass, which the next section names; readbacks are a pass of their own; "
+        "the spread is the largest of (most - least) / median. Flicker is that of `diaphane bench`, over a path of "
         f"{PATH_FRAMES} frames. Means over views are geometric for errors, arithmetic else. `kbuffer-temporal` learns "
         "from the frames before: it is measured at rest and in motion in [TEMPORAL.md](TEMPORAL.md).\n",
     ]
