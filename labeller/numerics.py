@@ -97,7 +97,16 @@ def add_squared(
     display: bool,
     out: NDArray[np.float64],
 ) -> None:
-    """Add the squared differences of `base + factor sums`, as display values if `display`, from `exact`: all [M]."""
+    """Add the squared differences of `base + factor sums`, as display values if `display`, from `exact`: all [M].
+
+    Args:
+        base: float64 [M], linear light of the core.
+        factor: float64 [M], what the sums are multiplied by.
+        sums: float64 [M], linear light of the tail and the background.
+        exact: float64 [M], the exact values: sRGB-encoded if `display`, else linear.
+        display: Whether to compare display values (sRGB, clamped) rather than linear ones.
+        out: float64 [M], squared differences, added to in place.
+    """
     if display:
         for i in range(len(out)):
             difference = display_of(base[i] + factor[i] * sums[i]) - exact[i]
