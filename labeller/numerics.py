@@ -100,9 +100,9 @@ def add_squared(
     """Add the squared differences of `base + factor sums`, as display values if `display`, from `exact`: all [M].
 
     Args:
-        base: float64 [M], linear light of the core.
-        factor: float64 [M], what the sums are multiplied by.
-        sums: float64 [M], linear light of the tail and the background.
+        base: float64 [M], one channel of the core and of the background behind core and tail.
+        factor: float64 [M], the tail's share of the pixel, over the sum of its weights.
+        sums: float64 [M], the same channel of the tail's fragments, weighted and summed.
         exact: float64 [M], the exact values: sRGB-encoded if `display`, else linear.
         display: Whether to compare display values (sRGB, clamped) rather than linear ones.
         out: float64 [M], squared differences, added to in place.
