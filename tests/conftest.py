@@ -12,6 +12,7 @@ import moderngl
 import pytest
 from hypothesis import settings
 from support.browser import CHROMIUM, browser
+from support.kernels import compile_in_turns
 from support.postgres import Postgres
 from support.s3 import S3Server, environment
 
@@ -30,6 +31,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # Failing examples are printed as code, so the same examples everywhere cost nothing; a shared machine has no deadline.
 settings.register_profile("diaphane", deadline=None, max_examples=50, derandomize=True, database=None)
 settings.load_profile("diaphane")
+
+compile_in_turns()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -206,12 +206,10 @@ def test_several_scenes_and_listed_views_do_not_overwrite_each_other(
     assert "More than one picture" in capsys.readouterr().err
 
 
-def test_a_bundle_is_a_folder_or_a_name_in_the_registry(
-    folder: Path, gl: moderngl.Context, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_bundle_is_a_folder_or_a_name_in_the_registry(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = folder / "bundle"
     made.mkdir()
-    export_random(made, random_weights(3), real_features(64, 5), gl)
+    export_random(made, random_weights(3), real_features(64, 5))
     settings = Settings(state=folder / ".diaphane", database="", store="", cache="")
     database = open_database(settings.database_url)
     registry = open_registry(database, open_storage(settings).blobs, settings)
