@@ -24,7 +24,7 @@ from services.cli.scene_options import (
     VariantOption,
     WidthOption,
 )
-from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption
+from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption, find_key
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
 from services.cli.technique_options import (
     BudgetOption,
@@ -152,9 +152,7 @@ def view(
     )
     service = None
     if model is not None:
-        from services.cli.remote import read_key
-
-        service = Service(model, url, read_key(key_file), state, watch, public_key)
+        service = Service(model, url, find_key(url, key_file), state, watch, public_key)
     from services.viewer.run import view as run
 
     rows = run(options, service, make_progress(sys.stderr, silent=as_json))

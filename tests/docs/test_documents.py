@@ -27,6 +27,7 @@ DOCUMENTS = (
     "docs/SERVICE.md",
     "docs/BUNDLE.md",
     "docs/CLIENTS.md",
+    "docs/CONFIGURATION.md",
 )
 
 DISTRIBUTIONS = {

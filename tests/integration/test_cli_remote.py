@@ -43,7 +43,7 @@ def server(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeServer
 
 
 def remote(server: FakeServer) -> Remote:
-    return open_remote(server.url, None)
+    return open_remote(server.url, KEY)
 
 
 def usdz(folder: Path, name: str = "glass.usdz", size: int = 2500) -> Path:
@@ -289,10 +289,15 @@ def test_the_key_is_never_shown(
     assert KEY not in captured.out + captured.err + caplog.text + repr(transport)
 
 
-def test_the_key_comes_from_a_file(server: FakeServer, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_key_comes_from_a_file_that_only_its_owner_reads(
+    server: FakeServer, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.delenv("DIAPHANE_KEY")
     assert run(["jobs", "list"]) == ExitCode.AUTH
     (folder / "key").write_text(f"{KEY}\n")
+    assert run(["jobs", "list", "--key-file", "key"]) == ExitCode.AUTH
+    assert "chmod 600 key" in capsys.readouterr().err
+    (folder / "key").chmod(0o600)
     assert run(["jobs", "list", "--key-file", "key"]) == ExitCode.OK
 
 
