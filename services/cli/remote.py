@@ -116,18 +116,27 @@ class Remote:
         body = {"name": package.name, "root": package.root, "files": hashes}
         return self._json("POST", "/v1/scenes", json=body)
 
-    def wait_for_scene(self, scene_id: str, patience: float = 1800.0) -> JSON:
+    def wait_for_scene(
+        self, scene_id: str, patience: float = 1800.0, waiting: Callable[[float, JSON], None] = lambda *_: None
+    ) -> JSON:
         """The scene once it has been checked: accepted or rejected.
+
+        Args:
+            scene_id: Its id.
+            patience: Seconds at most.
+            waiting: Is told, now and then, for how many seconds the check has been waited for, and of which scene.
 
         Raises:
             Problem: It takes longer than `patience` seconds.
         """
-        end, wait = time.monotonic() + patience, 0.1
+        start, wait = time.monotonic(), 0.1
         while True:
             scene = self.scene(scene_id)
             if scene["state"] != "checking":
                 return scene
-            if time.monotonic() > end:
+            waited = time.monotonic() - start
+            waiting(waited, scene)
+            if waited > patience:
                 raise Problem(
                     f"The scene {scene_id} is still being checked.",
                     "Look at `diaphane workers`: is there one with the role render? Then run it again.",

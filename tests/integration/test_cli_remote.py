@@ -18,6 +18,7 @@ from support.fake_server import KEY, PART_BYTES, FakeServer, Fault, fake_server
 
 import services
 from schemas.problem import ExitCode, Problem
+from services.cli import inputs
 from services.cli.app import run
 from services.cli.packing import pack
 from services.cli.remote import Remote, open_remote, server_sent
@@ -272,6 +273,19 @@ def test_a_redirect_is_not_followed(server: FakeServer) -> None:
         server.faults.append(Fault("GET", "/v1/jobs", status=307, headers={"Location": f"{other.url}/v1/jobs"}))
         assert run(["jobs", "list"]) == ExitCode.USAGE
         assert other.asked == []
+
+
+def test_an_upload_says_that_the_check_still_runs(
+    server: FakeServer, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(inputs, "_FIRST_TOLD_SECONDS", 0.0)
+    server.checks = 2
+    usdz(folder)
+    assert run(["scenes", "upload", "glass.usdz"]) == ExitCode.OK
+    captured = capsys.readouterr()
+    assert "check scenes: 1" in captured.err
+    assert "glass is still being checked (0 s); `diaphane workers` shows the queue." in captured.err
+    assert "accepted" in captured.out
 
 
 def test_the_key_is_never_shown(
