@@ -30,8 +30,8 @@ from services.cli.technique_options import (
     BudgetOption,
     InferenceOption,
     NodesOption,
-    SamplesOption,
     SteepnessOption,
+    StochasticSamplesOption,
     TailOption,
     VkbOption,
 )
@@ -67,7 +67,7 @@ def view(
     inference: InferenceOption = "glsl",
     vkb: VkbOption = "",
     nodes: NodesOption = None,
-    samples: SamplesOption = None,
+    stochastic_samples: StochasticSamplesOption = None,
     camera: CameraOption = None,
     views: Annotated[Path | None, typer.Option("--views", help="JSON file with views of the scene.")] = None,
     view: Annotated[
@@ -127,7 +127,7 @@ def view(
         render=RenderOptions(
             scenes=(file,),
             techniques=parse_techniques([technique or ("kbuffer-deep" if has_bundle else "kbuffer")], has_bundle),
-            needs=parse_needs(vkb, inference, nodes, samples),
+            needs=parse_needs(vkb, inference, nodes, stochastic_samples),
             budget=budget,
             tail=None if tail is None else parse_tail(tail),
             g=g,
