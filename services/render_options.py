@@ -248,9 +248,10 @@ def parse_aovs(names: Sequence[str]) -> tuple[AovName, ...]:
     """
     found: list[AovName] = []
     for name in _listed(names):
-        if name not in CHANNELS:
+        known = next((each for each in CHANNELS if each == name), None)
+        if known is None:
             raise Problem(f"There is no plane '{name}'.", f"Use some of {', '.join(CHANNELS)}: --aov depth,alpha.")
-        found.append(name)
+        found.append(known)
     return tuple(dict.fromkeys(found))
 
 

@@ -41,7 +41,7 @@ from services.scene_warnings import said_warnings
 from services.shots import Shot, Subject, shoot
 from services.stages.pictures import write_png
 from services.summary import full_title
-from services.writing import replacing, said_new_folder
+from services.writing import replacing
 
 SHEET = "sheet"
 """What the name of a contact sheet has in the place of a technique."""
@@ -178,8 +178,6 @@ def render(options: RenderOptions, progress: Progress) -> Iterator[Picture]:
         trained = next((way.warm.manifest.tail for way in ways if isinstance(way.warm, KBufferDeep)), None)
         check_trained_tail(options.tail, trained)
         tail = chosen_tail(options.tail, options.g, trained)
-        if options.output is not None and (said := said_new_folder(options.output.parent)):
-            progress.note(said)
         written: set[Path] = set()
         for file in options.scenes:
             with as_usd(file) as usd:

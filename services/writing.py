@@ -11,15 +11,6 @@ from pathlib import Path
 from schemas.problem import ExitCode, Problem
 
 
-def said_new_folder(folder: Path) -> str | None:
-    """A sentence on a folder that a result makes on its way; None: it is there.
-
-    Args:
-        folder: That the result goes into.
-    """
-    return None if folder.exists() else f"note: the folder {folder} does not exist, and is made."
-
-
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A path to write a file or a folder to, which becomes `path` at the end; folders above it are made.

@@ -138,6 +138,8 @@ def bench(
     from services.bench.run import check_same_code, no_views
     from services.cli.bench_table import show
 
+    if not as_json:
+        output.tell_new_folder(out.parent)
     progress = make_progress(sys.stderr, silent=as_json)
     result = run(options, shlex.join(["diaphane", *sys.argv[1:]]), progress)
     if not result.views:

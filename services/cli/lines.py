@@ -21,16 +21,6 @@ def print_columns(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> Non
         print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
 
 
-def counted(count: int, noun: str) -> str:
-    """A number with its noun, as `1 view`, `1,200 views`.
-
-    Args:
-        count: How many.
-        noun: Singular of a noun whose plural ends in s.
-    """
-    return f"{count:,} {noun}{'' if count == 1 else 's'}"
-
-
 def seconds(value: float | None) -> str:
     """A duration as `42 s`, `3 min`, `2 h 5 min`."""
     if value is None:

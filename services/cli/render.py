@@ -11,7 +11,7 @@ import typer
 
 from schemas.glass import DEFAULT_GLASS
 from services.cli import output
-from services.cli.lines import counted, print_columns, size
+from services.cli.lines import print_columns, size
 from services.cli.scene_options import (
     WHITE,
     AlphaOption,
@@ -34,6 +34,7 @@ from services.cli.technique_options import (
     TailOption,
     VkbOption,
 )
+from services.wording import counted
 
 if TYPE_CHECKING:
     from services.ranking import Rank
@@ -142,6 +143,8 @@ def render(
         compare=compare,
         state=state,
     )
+    if target is not None and not as_json:
+        output.tell_new_folder(target.parent)
     from services.rendering import render as run
 
     pictures, progress = [], make_progress(sys.stderr, silent=as_json)
@@ -176,16 +179,16 @@ def _show(picture: Picture) -> None:
     drawn = picture.width * picture.height * picture.samples
     least, most = picture.k
     kept = f", {picture.captured:,} kept apart, k {least}..{most}"
-    fragments = counted(picture.fragments or 0, "fragment")
+    fragments = counted(picture.fragments or 0, "fragments")
     print(f"  {fragments}, {(picture.fragments or 0) / drawn:.2f} per pixel{kept if most else ''}")
     if picture.family == "bounded":
-        print(f"  budget {counted(picture.budget, 'fragment')}, {picture.tail} tail")
+        print(f"  budget {counted(picture.budget, 'fragments')}, {picture.tail} tail")
     samples = f" for {picture.samples} samples per pixel" if picture.samples > 1 else ""
     passes = ", ".join(f"{name} {ms:.1f}" for name, ms in picture.passes.items())
     print(f"  {picture.milliseconds:.1f} ms{samples}: {passes}")
     print(f"  memory: {_memory(picture)}")
     if picture.skips:
-        print(f"  skipped: {', '.join(f'{count:,} {what}' for what, count in picture.skips.items())}")
+        print(f"  skipped: {', '.join(counted(count, what) for what, count in picture.skips.items())}")
     if picture.mse is not None:
         psnr = "no error" if picture.psnr is None else f"PSNR {picture.psnr:.2f} dB"
         print(f"  against exact: MSE {1e5 * picture.mse:.4g} x1e-5, {psnr}, FLIP {picture.flip:.4g}")
@@ -197,7 +200,7 @@ def _memory(picture: Picture) -> str:
     pool = f"pool {size(picture.pool_bytes or 0)}"
     if not picture.fits:
         pool += f" (it {said_unfit()})"
-    beside = f"{counted(picture.pixel_bytes or 0, 'byte')} per pixel beside it"
+    beside = f"{counted(picture.pixel_bytes or 0, 'bytes')} per pixel beside it"
     return f"{pool}, {beside}, {size(picture.total_bytes or 0)} at most"
 
 
@@ -205,7 +208,7 @@ def _show_ranks(ranks: Sequence[Rank]) -> None:
     from services.summary import full_title, number
 
     asked = ranks[0].asked
-    over = f", means over {counted(asked, 'picture')}" if asked > 1 else ""
+    over = f", means over {counted(asked, 'pictures')}" if asked > 1 else ""
     print(f"\nRanked by error against the exact picture, then by time{over}")
     print_columns(
         ("rank", "technique", "family", "MSE e-5", "PSNR dB", "FLIP", "ms", "memory"),
@@ -225,4 +228,4 @@ def _show_ranks(ranks: Sequence[Rank]) -> None:
     )
     for rank in ranks:
         if 0 < rank.rendered < asked:
-            print(f"{rank.technique}: {rank.rendered} of {counted(asked, 'picture')}; the others were left out")
+            print(f"{rank.technique}: {rank.rendered} of {counted(asked, 'pictures')}; the others were left out")

@@ -153,6 +153,8 @@ def view(
     service = None
     if model is not None:
         service = Service(model, url, find_key(url, key_file), state, watch, public_key)
+    if out is not None and not as_json:
+        output.tell_new_folder(out.parent)
     from services.viewer.run import view as run
 
     rows = run(options, service, make_progress(sys.stderr, silent=as_json))

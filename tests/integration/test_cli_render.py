@@ -238,9 +238,15 @@ def test_a_scene_without_anything_transparent_is_said_to_have_none(
 
 
 def test_a_folder_that_is_made_on_the_way_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for name, is_said in (("new/deep/a.png", True), ("new/deep/b.png", False), ("c.png", False)):
-        assert run(["render", "panes.usda", "-w", "16", "-o", name]) == ExitCode.OK
-        assert ("the folder new/deep does not exist, and is made" in capsys.readouterr().err) is is_said
+    for command, name, is_said in (
+        ("render", "new/deep/a.png", True),
+        ("render", "new/deep/b.png", False),
+        ("render", "c.png", False),
+        ("dump", "new/dumps/d.exr", True),
+    ):
+        assert run([command, "panes.usda", "-w", "16", "-o", name]) == ExitCode.OK
+        told = f"the folder {Path(name).parent} does not exist; it will be made" in capsys.readouterr().err
+        assert told is is_said
         assert (folder / name).is_file()
 
 
