@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import tempfile
 from collections.abc import Callable, Iterator
@@ -27,6 +28,9 @@ Machine = Callable[[str], Storage]
 # A shell's background job begins with interrupts ignored, and the programs that tests start and interrupt would, too.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Whoever runs the tests may have a configuration of their own, which they do not read.
+os.environ["XDG_CONFIG_HOME"] = str(Path(tempfile.gettempdir()) / "diaphane-no-configuration")
 
 # Failing examples are printed as code, so the same examples everywhere cost nothing; a shared machine has no deadline.
 settings.register_profile("diaphane", deadline=None, max_examples=50, derandomize=True, database=None)
