@@ -27,6 +27,8 @@ LOST: Final = "MAX_RECOVERY_ATTEMPTS_EXCEEDED"
 SCHEMA: Final = "dbos"
 LONGEST_WAIT_SECONDS = 2.0
 """Before DBOS asks again for a database that did not answer."""
+QUEUE_SECONDS = 5.0
+"""For so long a process goes by what it has read of a queue: nothing there changes while a service runs."""
 
 _COLUMNS = (
     *("workflow_uuid", "status", "name", "executor_id", "application_version", "queue_name", "priority"),
@@ -236,24 +238,50 @@ def remove(client: DBOSClient, ids: Sequence[str]) -> None:
         client.delete_workflows(list(ids[start : start + 500]))
 
 
-def limit_slots(slots: dict[str, int]) -> None:
-    """Bounds what this process claims of each queue; the dictionary may change at any time.
+def steer_claims(database: Database, slots: dict[str, int]) -> None:
+    """Bounds what this process claims of each queue, and has it ask for work in a tenth of a millisecond.
 
-    DBOS keeps a queue's concurrency in the database, the same for all workers, but machines differ. So the process's
-    own number is put into what it reads there before every claim.
+    DBOS keeps a queue's concurrency in the database, the same for all workers, but machines differ: the process's own
+    number is put into what it reads there. And DBOS looks into a queue with two transactions, whether anything waits
+    or not: 3 ms of the processor at every poll of every process. So one short statement is asked first, as often as
+    before, and DBOS claims where it finds something.
+
+    Args:
+        database: That the queues are in.
+        slots: How much this process does of each queue at once; the dictionary may change at any time.
     """
     from dbos._dbos import _get_dbos_instance
 
     system_database = _get_dbos_instance()._sys_db
-    read = system_database.get_queue
+    read, read_at, queues = system_database.get_queue, dict[str, float](), dict[str, Any]()
+    waits = waiting(database)
 
     def get_queue(name: str, **options: Any) -> Any:
-        queue = read(name, **options)
+        now = time.monotonic()
+        if name not in queues or now - read_at[name] > QUEUE_SECONDS:
+            queues[name], read_at[name] = read(name, **options), now
+        queue = queues[name]
         if queue is not None:
             queue._worker_concurrency = slots.get(name, 0)
         return queue
 
-    system_database.get_queue = get_queue  # type: ignore[method-assign]
+    def dequeue_scopes(name: str) -> list[None]:
+        with database.read() as connection:
+            return [None] if connection.scalar(waits, {"queue": name}) else []
+
+    vars(system_database).update(get_queue=get_queue, dequeue_scopes=dequeue_scopes)
+
+
+def waiting(database: Database) -> sa.Select[Any]:
+    """Whether anything waits in the queue `queue`: one row or none."""
+    table = workflows(database)
+    here = [
+        table.c.queue_name == sa.bindparam("queue", type_=sa.Text),
+        table.c.status == sa.literal_column("'ENQUEUED'"),
+    ]
+    if not database.is_postgresql:  # what SQLite takes the partial index for: its condition, word for word
+        here.append(sa.literal_column("status in ('ENQUEUED', 'PENDING')"))
+    return sa.select(sa.literal_column("1")).select_from(table).where(*here).limit(1)
 
 
 def bound_waits() -> None:
