@@ -15,6 +15,7 @@ from schemas.problem import ExitCode, Problem
 from services.cli.state import DEFAULT_STATE, STATE_VARIABLE, StateOption
 
 if TYPE_CHECKING:
+    from services.api.server import Server
     from services.service import Service
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 8035
@@ -36,10 +37,14 @@ def serve(
 
     wanted = () if roles.strip() == "none" else parse_roles(roles)
     os.environ[STATE_VARIABLE] = str(state)
-    from services import logs
-    from services.engine.runtime import Runtime
-    from services.service import open_service
-    from services.settings import Settings
+    from services.loading import uncollected
+
+    with uncollected():
+        from services import logs
+        from services.api.server import make_server
+        from services.engine.runtime import Runtime
+        from services.service import open_service
+        from services.settings import Settings
 
     logs.set_up()
     settings = Settings()
@@ -48,7 +53,8 @@ def serve(
     runtime = Runtime(settings, wanted) if wanted else None  # with a store of its own, which waits longer
     stop = threading.Event()
     stop_on_signal(stop.set)
-    listener = _Listener(service, host, port)
+    names = [name.strip() for name in settings.hosts.split(",") if name.strip()]
+    listener = _Listener(make_server(service, host, port, names), host, port, settings.drain_seconds)
     try:
         listener.start()
         listener.wait_ready()  # before any work is claimed: it may be that it cannot listen
@@ -68,13 +74,10 @@ def serve(
 class _Listener(threading.Thread):
     """The HTTP server, in a thread: signals belong to the main one."""
 
-    def __init__(self, service: Service, host: str, port: int) -> None:
+    def __init__(self, server: Server, host: str, port: int, drain_seconds: float) -> None:
         super().__init__(daemon=True, name="http")
-        from services.api.server import make_server
-
-        names = [name.strip() for name in service.settings.hosts.split(",") if name.strip()]
-        self._server = make_server(service, host, port, names)
-        self._where, self._drain_seconds = (host, port), service.settings.drain_seconds
+        self._server = server
+        self._where, self._drain_seconds = (host, port), drain_seconds
 
     @property
     def port(self) -> int:
