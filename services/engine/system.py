@@ -6,6 +6,7 @@ tables of our own, in the same database, so that a state and what is queued for 
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
@@ -254,7 +255,7 @@ def steer_claims(database: Database, slots: dict[str, int]) -> None:
 
     system_database = _get_dbos_instance()._sys_db
     read, read_at, queues = system_database.get_queue, dict[str, float](), dict[str, Any]()
-    waits = waiting(database)
+    waits = _Waits(database)
 
     def get_queue(name: str, **options: Any) -> Any:
         now = time.monotonic()
@@ -266,10 +267,42 @@ def steer_claims(database: Database, slots: dict[str, int]) -> None:
         return queue
 
     def dequeue_scopes(name: str) -> list[None]:
-        with database.read() as connection:
-            return [None] if connection.scalar(waits, {"queue": name}) else []
+        return [None] if waits(name) else []
 
     vars(system_database).update(get_queue=get_queue, dequeue_scopes=dequeue_scopes)
+
+
+class _Waits:
+    """Asks whether anything waits in a queue: by the driver, on a connection that each thread keeps."""
+
+    def __init__(self, database: Database) -> None:
+        self._database, self._own = database, threading.local()
+        self._texts: dict[str, str] = {}
+
+    def __call__(self, queue: str) -> bool:
+        if not hasattr(self._own, "connection"):
+            self._own.connection = self._connect()
+        try:
+            return bool(self._own.connection.execute(self._text(queue)).fetchall())
+        except Exception:  # the server went away: the next look connects again
+            self._own.connection.close()
+            del self._own.connection
+            raise
+
+    def _connect(self) -> Any:
+        pooled = self._database.engine.raw_connection()
+        connection: Any = pooled.driver_connection
+        pooled.detach()
+        if self._database.is_postgresql:  # to SQLite's it is by our own setting
+            connection.autocommit = True
+        return connection
+
+    def _text(self, queue: str) -> str:
+        if queue not in self._texts:
+            asked = waiting(self._database).params(queue=queue)
+            options = {"literal_binds": True}
+            self._texts[queue] = str(asked.compile(self._database.engine, compile_kwargs=options))
+        return self._texts[queue]
 
 
 def waiting(database: Database) -> sa.Select[Any]:
