@@ -86,7 +86,8 @@ class Truth:
         """float64 [P, 3] of a twin that reads fragments in the order of submission; empty where not compared.
 
         Args:
-            twin: The twin.
+            twin: Takes offsets int64 [P+1], packed colours uint32 [N], depths float32 [N] and backgrounds uint8 [P, 3],
+                and returns linear RGB float64 [P, 3].
             pool: Of all pixels, compared or not: what it has no room for is lost.
         """
         found = self.ordered if pool is None else arriving(self.ordered, pool.slots * self.dump.pixels)
@@ -96,7 +97,12 @@ class Truth:
         return twin(offsets_of(counts * compared), found.packed[kept], found.depth[kept], self.dump.background)
 
     def hybrid(self, k: NDArray[np.integer], tail: TailName) -> Floats:
-        """float64 [P, 3], the pixels with k core fragments and a tail (METHOD.md section 2); NaN if not compared."""
+        """float64 [P, 3], the pixels with k core fragments and a tail (METHOD.md section 2); NaN if not compared.
+
+        Args:
+            k: Integers [P], core fragments of each pixel.
+            tail: How the others are approximated.
+        """
         made = np.full((self.dump.pixels, 3), np.nan)
         for p in self.case.pixels.tolist():
             made[p] = self._hybrid(p, int(k[p]), tail)
