@@ -42,7 +42,14 @@ def aovs(frame: Frame, rendered: Rendered, names: Sequence[AovName]) -> dict[Aov
 
 
 def mean_aovs(samples: Sequence[Mapping[AovName, NDArray[np.float32]]]) -> dict[AovName, NDArray[np.float32]]:
-    """Planes of the samples of an antialiased picture as one: means, and of depths the nearest."""
+    """Planes of the samples of an antialiased picture as one: means, and of depths the nearest.
+
+    Args:
+        samples: Of each sample, float32 [H, W] by name, as `aovs` has them: depth in metres, the others without a unit.
+
+    Returns:
+        float32 [H, W] by name.
+    """
     found: dict[AovName, NDArray[np.float32]] = {}
     for name in samples[0]:
         planes = np.stack([sample[name] for sample in samples])
