@@ -37,6 +37,7 @@ from services.cli import (
     scene,
     scenes,
     serve,
+    storm,
     stress,
     view,
     worker,
@@ -59,6 +60,7 @@ add_command(app, "bench", bench.bench, "schemas.work:Device")
 app.add_typer(scene.app, name="scene")
 app.command("samples")(samples.samples)
 app.command("stress")(stress.stress)
+app.add_typer(storm.app, name="storm")
 app.command("serve")(serve.serve)
 app.command("worker")(worker.worker)
 add_command(app, "retrain", retrain.retrain, "schemas.job:JobSpec", without=retrain.OWN, variables=retrain.VARIABLES)
