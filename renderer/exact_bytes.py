@@ -68,6 +68,15 @@ def sbuffer_load(memory: int, pixels: int) -> float:
     return (memory / pixels - _WORD_BYTES) / SLOT_BYTES
 
 
+def sbuffer_bytes(load: float) -> float:
+    """Bytes a pixel of an S-buffer.
+
+    Args:
+        load: Fragments a pixel.
+    """
+    return SLOT_BYTES * load + _WORD_BYTES
+
+
 def fits(pool_bytes: int) -> bool:
     """Whether a pool is no larger than one storage buffer may be; larger ones are rendered in bands of rows."""
     return pool_bytes <= LIMITS.buffer_bytes

@@ -27,8 +27,8 @@ from services.advice.rules import affordable, candidates
 from services.bench.cells import Bundle
 from services.bench.subject import Subject
 
-MEASURED_PIXELS: Final = 480 * 270
-"""Errors are means over pixels: so many are enough to rank techniques, and cost a tenth of a second each."""
+MEASURED_PIXELS: Final = 384 * 216
+"""Errors are means over pixels: so many are enough to rank techniques, and a scene is advised in seconds."""
 COUNTED_PIXELS: Final = 1920 * 1080
 """Counting is one pass over the geometry; fragments a pixel do not depend on the size beyond this."""
 LEFT_OUT: Final = ("kbuffer-temporal", "kbuffer-optimal")

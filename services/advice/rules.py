@@ -25,15 +25,15 @@ def candidates(samples: Iterable[Sample], views: Sequence[str]) -> tuple[Candida
     """Techniques and budgets over the same views; one that misses a view is left out.
 
     Args:
-        samples: Of each technique, budget and view at most one.
+        samples: Of several of a technique, budget and view the first counts.
         views: Names of the views that count.
     """
-    kinds: dict[tuple[str, str, float | None, str, str], list[Sample]] = {}
+    kinds: dict[tuple[str, str, float | None, str, str], dict[str, Sample]] = {}
     for sample in samples:
         if sample.view in views:
             key = sample.technique, sample.family, sample.budget, sample.tail, sample.bundle
-            kinds.setdefault(key, []).append(sample)
-    return tuple(_candidate(found) for found in kinds.values() if {each.view for each in found} == set(views))
+            kinds.setdefault(key, {}).setdefault(sample.view, sample)
+    return tuple(_candidate(list(found.values())) for found in kinds.values() if set(found) == set(views))
 
 
 def _candidate(found: Sequence[Sample]) -> Candidate:

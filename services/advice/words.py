@@ -10,16 +10,16 @@ from schemas.advice import Advice, Candidate, Choice, Work
 from services.advice.rules import shown_instead
 from services.summary import EXACT, MSE_FLOOR, number
 
-HEADINGS: Final = ("", "technique", "budget", "tail", "MiB", "fits", "MSE e-5", "worst view")
+HEADINGS: Final = ("technique", "budget", "MiB", "MSE e-5", "within the memory", "tail", "worst view")
 """Of `table`."""
-SIZE_HEADINGS: Final = ("size", "S-buffer, MiB", "within the memory", "MiB", "MSE e-5")
+SIZE_HEADINGS: Final = ("size", "S-buffer, MiB", "advised", "MiB", "MSE e-5")
 """Of `sizes`."""
 WORK_HEADINGS: Final = ("technique", "geometry passes", "shaded / pixel", "B / pixel", "atomics / pixel")
 """Of `work_rows`."""
-TEXT: Final = ("", "technique", "tail", "worst view", "size", "within the memory")
+TEXT: Final = ("technique", "tail", "within the memory", "worst view", "size", "advised")
 """Headings of columns that are text."""
-ADVISED: Final = "→"
-TIED: Final = "="
+ADVISED: Final = "advised"
+"""Marks the row of what was chosen."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,13 +161,19 @@ def table(advice: Advice) -> list[list[str]]:
     choice = advice.choice
     rows = []
     for one in advice.best:
-        fits = one.bytes_at(choice.size.pixels) <= choice.memory
         budget = "–" if one.budget is None else f"{one.budget:g}"
-        worst = "–" if one.is_exact else f"{said_mse(max(one.worst, MSE_FLOOR))} {one.worst_view}"
-        mark = ADVISED if one == choice.chosen else TIED if one in choice.ties else ""
-        measured = [_mib(one, choice), "yes" if fits else "no", said_mse(one.mse), worst]
-        rows.append([mark, one.technique, budget, one.tail or "–", *measured])
+        worst = "–" if one.is_exact else f"{said_mse(max(one.worst, MSE_FLOOR))}, {one.worst_view}"
+        measured = _mib(one, choice), said_mse(one.mse), _place(one, choice)
+        rows.append([one.technique, budget, *measured, one.tail or "–", worst])
     return rows
+
+
+def _place(one: Candidate, choice: Choice) -> str:
+    if one == choice.chosen:
+        return ADVISED
+    if one in choice.ties:
+        return "as good"
+    return "fits" if one.bytes_at(choice.size.pixels) <= choice.memory else "no"
 
 
 def sizes(advice: Advice) -> list[list[str]]:
@@ -214,9 +220,9 @@ def commands(advice: Advice, asked: Asked) -> tuple[str, ...]:
     picture = ["render", *scene, *views, "-t", chosen.technique, *budget, *tail, *needs, *size, "-o", "out.png"]
     found = [[*picture, *([] if chosen.is_exact else ["--compare"])]]
     other = shown_instead(advice)
-    if other is not None and other.budget is not None:
-        names = ",".join(dict.fromkeys((EXACT, "kbuffer-importance", other.technique)))
-        budgets = ["--budgets", f"{other.budget:g}"]
+    if other is not None:
+        names = f"{EXACT},{other.technique}"
+        budgets = [] if other.budget is None else ["--budgets", f"{other.budget:g}"]
         needs = bundle if other.bundle else []
         found.append(["bench", *scene, *views, "-t", names, *budgets, *needs, *size, "-o", "bench"])
     if not chosen.is_exact and chosen.budget is not None and asked.bundle is not None:

@@ -12,7 +12,7 @@ import typer
 
 from schemas.glass import DEFAULT_GLASS
 from services.cli import output
-from services.cli.lines import print_columns
+from services.cli.lines import plain, print_columns
 from services.cli.scene_options import AlphaOption, ComplexityOption, GlassOption, RefineOption, VariantOption
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
 
@@ -93,9 +93,7 @@ def show(advice: Advice) -> None:
     """
     from services.advice import words
 
-    print(f"\n{advice.scene.name}")
-    for sentence in advice.text:
-        print(textwrap.fill(sentence, WIDTH))
+    show_sentences(advice)
     if advice.best:
         print()
         print_columns(words.HEADINGS, words.table(advice))
@@ -108,3 +106,14 @@ def show(advice: Advice) -> None:
         print("\nNext:")
         for command in advice.commands:
             print(f"  {command}")
+
+
+def show_sentences(advice: Advice) -> None:
+    """Print what to use and why, in words.
+
+    Args:
+        advice: What to use, and why.
+    """
+    print(f"\n{plain(advice.scene.name)}")
+    for sentence in advice.text:
+        print(textwrap.fill(plain(sentence), WIDTH))
