@@ -58,25 +58,6 @@ def exact_bytes(name: str, n: NDArray[np.integer]) -> ExactBytes | None:
     return None if found is None else ExactBytes(*found, pixels)
 
 
-def sbuffer_load(memory: int, pixels: int) -> float:
-    """Fragments a pixel that an S-buffer of this memory holds; negative where its offsets alone take more.
-
-    Args:
-        memory: Bytes of all buffers.
-        pixels: P.
-    """
-    return (memory / pixels - _WORD_BYTES) / SLOT_BYTES
-
-
-def sbuffer_bytes(load: float) -> float:
-    """Bytes a pixel of an S-buffer.
-
-    Args:
-        load: Fragments a pixel.
-    """
-    return SLOT_BYTES * load + _WORD_BYTES
-
-
 def fits(pool_bytes: int) -> bool:
     """Whether a pool is no larger than one storage buffer may be; larger ones are rendered in bands of rows."""
     return pool_bytes <= LIMITS.buffer_bytes

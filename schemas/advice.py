@@ -2,12 +2,37 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Final, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 Verdict = Literal["nothing", "exact", "technique", "none"]
 """Nothing is transparent; the S-buffer fits; the technique of least error that fits; nothing fits."""
+
+
+SLOT_BYTES: Final = 8
+"""Bytes of a fragment in the S-buffer."""
+OFFSET_BYTES: Final = 4
+"""Bytes a pixel of the S-buffer beside its fragments."""
+
+
+def sbuffer_bytes(load: float) -> float:
+    """Bytes a pixel of the S-buffer, which `renderer.exact_bytes` has of a frame.
+
+    Args:
+        load: Fragments a pixel.
+    """
+    return SLOT_BYTES * load + OFFSET_BYTES
+
+
+def sbuffer_load(memory: int, pixels: int) -> float:
+    """Fragments a pixel that an S-buffer of this memory holds; negative where its offsets alone take more.
+
+    Args:
+        memory: Bytes of all buffers.
+        pixels: Of the picture.
+    """
+    return (memory / pixels - OFFSET_BYTES) / SLOT_BYTES
 
 
 class _Plain(BaseModel):
@@ -121,7 +146,7 @@ class Work(_Plain):
     atomics: float
 
 
-class Scene(_Plain):
+class AdvisedScene(_Plain):
     """What is known of a scene.
 
     Attributes:
@@ -181,7 +206,7 @@ class Advice(_Plain):
         warnings: What the scene has and its picture has not.
     """
 
-    scene: Scene
+    scene: AdvisedScene
     choice: Choice
     best: tuple[Candidate, ...]
     front: tuple[Candidate, ...]

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from renderer.exact_bytes import sbuffer_bytes
-from renderer.techniques import TECHNIQUES
-from schemas.advice import Advice, Sample, Scene, SeenView, Size
+from schemas.advice import Advice, Sample, AdvisedScene, SeenView, Size, sbuffer_bytes
 from schemas.bench import BenchCell, BenchView
 from schemas.measurement import Measurement
-from services.advice.options import DEFAULT_MEMORY, parse_memory
+from services.advice.amounts import DEFAULT_MEMORY, parse_memory
 from services.advice.rules import advise, candidates
 from services.advice.words import sentences
-from services.summary import EXACT, ORACLE
+from services.summary import BUNDLE, EXACT, ORACLE
+
+BOUNDED = ("kbuffer", "kbuffer-dynamic", "kbuffer-importance", BUNDLE)
+"""Techniques of measurements that a renderer can run within a budget."""
 
 
 def of_bench(title: str, views: Sequence[BenchView]) -> Advice:
@@ -59,7 +60,7 @@ def of_measurements(
     return said(_scene(title, list(views.values()), samples, taken), size or taken, given)
 
 
-def said(scene: Scene, size: Size, memory: int) -> Advice:
+def said(scene: AdvisedScene, size: Size, memory: int) -> Advice:
     """Advice with its words.
 
     Args:
@@ -71,9 +72,9 @@ def said(scene: Scene, size: Size, memory: int) -> Advice:
     return advice.model_copy(update={"text": sentences(advice)})
 
 
-def _scene(title: str, views: Sequence[SeenView], samples: Sequence[Sample], size: Size) -> Scene:
+def _scene(title: str, views: Sequence[SeenView], samples: Sequence[Sample], size: Size) -> AdvisedScene:
     there = [view for view in views if view.load]
-    return Scene(
+    return AdvisedScene(
         name=title,
         views=tuple(views),
         counted=size,
@@ -107,18 +108,15 @@ def _of_cell(view: str, cell: BenchCell, size: Size) -> Sample | None:
 
 
 def _of_measurement(m: Measurement, bundle: str, size: Size) -> Sample | None:
-    family = TECHNIQUES[m.technique].family if m.technique in TECHNIQUES else ""
-    if family not in ("bounded", "approximate") or m.technique == ORACLE:
-        return None
-    if m.total_bytes is None or m.mse is None:
+    if m.technique not in BOUNDED or m.total_bytes is None or m.mse is None:
         return None
     return Sample(
         view=m.view,
         technique=m.technique,
-        family=family,
-        budget=m.budget_factor if family == "bounded" else None,
-        tail=m.tail if family == "bounded" else "",
-        bundle=bundle if TECHNIQUES[m.technique].needs_bundle else "",
+        family="bounded",
+        budget=m.budget_factor,
+        tail=m.tail,
+        bundle=bundle if m.technique == BUNDLE else "",
         pixel_bytes=m.total_bytes / size.pixels,
         mse=m.mse,
     )

@@ -17,7 +17,7 @@ from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.techniques import TECHNIQUES, Budget, Needs, Rendered, Technique, technique
 from renderer.techniques.chain import SLOT_BYTES
-from schemas.advice import Candidate, Sample, Scene, SeenView, Size, Work
+from schemas.advice import Candidate, Sample, AdvisedScene, SeenView, Size, Work
 from schemas.colour import display8
 from schemas.problem import ExitCode, Problem
 from schemas.tail import DEFAULT_TAIL
@@ -67,7 +67,7 @@ class Measuring:
         """Size of the pictures whose errors are measured."""
         return within(self.size, MEASURED_PIXELS)
 
-    def scene(self) -> Scene:
+    def scene(self) -> AdvisedScene:
         """All that is known of the scene."""
         counted = within(self.size, COUNTED_PIXELS)
         counts = {view.name: self._counts(view, counted) for view in self.views}
@@ -81,7 +81,7 @@ class Measuring:
             if view.name in loads:
                 samples += _exact(view.name, counts[view.name])
                 samples += self._samples(self.subject(view), default_budgets(loads.values()), max(loads.values()))
-        return Scene(
+        return AdvisedScene(
             name=self.name,
             views=tuple(seen),
             counted=counted,

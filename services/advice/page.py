@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
 from schemas.advice import Advice
 from services.advice import words
 from services.advice.charts import error_chart
-from services.advice.sheet import Sheet
 from services.report.page import environment
+
+if TYPE_CHECKING:
+    from services.advice.sheet import Sheet
 
 
 def page(parts: Sequence[tuple[Advice, Sheet | None]], command: str) -> str:

@@ -12,8 +12,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from renderer.exact_bytes import sbuffer_load
-from schemas.advice import Advice, Candidate, Choice, Sample, Scene, Size, Verdict
+from schemas.advice import Advice, Candidate, Choice, Sample, AdvisedScene, Size, Verdict, sbuffer_load
 from services.summary import EXACT, MSE_FLOOR, geometric_mean
 
 TIE: Final = 1.1
@@ -52,7 +51,7 @@ def _candidate(found: Sequence[Sample]) -> Candidate:
     )
 
 
-def choose(scene: Scene, size: Size, memory: int) -> Choice:
+def choose(scene: AdvisedScene, size: Size, memory: int) -> Choice:
     """What to use.
 
     Args:
@@ -88,7 +87,7 @@ def _once(alike: Iterable[Candidate], chosen: Candidate) -> list[Candidate]:
     return list(by_technique.values())
 
 
-def advise(scene: Scene, size: Size, memory: int) -> Advice:
+def advise(scene: AdvisedScene, size: Size, memory: int) -> Advice:
     """All that follows from the numbers; words and accounts come later.
 
     Args:
@@ -106,7 +105,7 @@ def advise(scene: Scene, size: Size, memory: int) -> Advice:
     )
 
 
-def best(scene: Scene, size: Size, memory: int) -> tuple[Candidate, ...]:
+def best(scene: AdvisedScene, size: Size, memory: int) -> tuple[Candidate, ...]:
     """Of each technique the candidate of least error that fits, else its smallest; what fits first, then by error."""
     found: dict[str, Candidate] = {}
     for one in sorted(scene.candidates, key=lambda each: _rank(each, size, memory)):
@@ -120,7 +119,7 @@ def _rank(one: Candidate, size: Size, memory: int) -> tuple[bool, float, float]:
     return is_over, one.pixel_bytes if is_over else one.mse, one.pixel_bytes
 
 
-def front(scene: Scene) -> tuple[Candidate, ...]:
+def front(scene: AdvisedScene) -> tuple[Candidate, ...]:
     """Candidates that no other beats in both bytes and error, by bytes; the S-buffer ends it.
 
     Peeling is no part of it: it trades geometry passes for bytes.

@@ -52,7 +52,8 @@ def advise(
     as_json: JsonOption = False,
 ) -> None:
     """Say which technique a scene needs within a memory, with which budget, and why."""
-    from services.advice.options import AdviceOptions, parse_frame, parse_memory
+    from services.advice.amounts import parse_frame, parse_memory
+    from services.advice.options import AdviceOptions
     from services.advice.page import page
     from services.advice.run import advised
     from services.render_options import loading
