@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from schemas.advice import Advice, Sample, AdvisedScene, SeenView, Size, sbuffer_bytes
+from schemas.advice import Advice, AdvisedScene, Sample, SeenView, Size, sbuffer_bytes
 from schemas.bench import BenchCell, BenchView
 from schemas.measurement import Measurement
 from services.advice.amounts import DEFAULT_MEMORY, parse_memory

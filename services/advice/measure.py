@@ -17,7 +17,7 @@ from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.techniques import TECHNIQUES, Budget, Needs, Rendered, Technique, technique
 from renderer.techniques.chain import SLOT_BYTES
-from schemas.advice import Candidate, Sample, AdvisedScene, SeenView, Size, Work
+from schemas.advice import AdvisedScene, Candidate, Sample, SeenView, Size, Work
 from schemas.colour import display8
 from schemas.problem import ExitCode, Problem
 from schemas.tail import DEFAULT_TAIL

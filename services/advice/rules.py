@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Final
 
-from schemas.advice import Advice, Candidate, Choice, Sample, AdvisedScene, Size, Verdict, sbuffer_load
+from schemas.advice import Advice, AdvisedScene, Candidate, Choice, Sample, Size, Verdict, sbuffer_load
 from services.summary import EXACT, MSE_FLOOR, geometric_mean
 
 TIE: Final = 1.1

@@ -63,10 +63,11 @@ def _verdict(advice: Advice) -> str:
             f"{number(choice.pays_above)} fragments a pixel, where the S-buffer does not fit any more."
         )
     if choice.chosen is None:
-        least = min((one for one in advice.scene.candidates if not one.is_exact), key=lambda one: one.pixel_bytes)
+        least = _least(advice)
+        what = "" if least.technique == EXACT else f", and what takes least, {said(least)}, {_mib(least, choice)} MiB"
         return (
-            f"{_loads(advice)} fragments a pixel, and nothing fits {memory} at {choice.size}: {needs}, and what takes "
-            f"least, {said(least)}, {_mib(least, choice)} MiB. Allow more memory or render fewer pixels."
+            f"{_loads(advice)} fragments a pixel, and nothing that was measured fits {memory} at {choice.size}: "
+            f"{needs}{what}. Allow more memory or render fewer pixels."
         )
     return (
         f"{_loads(advice)} fragments a pixel: {needs}, and {memory} at {choice.size} hold "
@@ -232,8 +233,13 @@ def commands(advice: Advice, asked: Asked) -> tuple[str, ...]:
 
 
 def _enough(advice: Advice) -> str:
-    least = min(one.pixel_bytes for one in advice.scene.candidates if not one.is_exact)
-    return f"{-(-round(least * advice.choice.size.pixels) // 2**20)}MiB"
+    return f"{-(-_least(advice).bytes_at(advice.choice.size.pixels) // 2**20)}MiB"
+
+
+def _least(advice: Advice) -> Candidate:
+    """What takes the fewest bytes, peeling apart."""
+    found = [one for one in advice.scene.candidates if not one.is_exact or one.technique == EXACT]
+    return min(found, key=lambda one: one.pixel_bytes)
 
 
 def _joined(*commands: list[str]) -> tuple[str, ...]:
