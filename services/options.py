@@ -69,7 +69,9 @@ class BuildOptions:
         _check_scenes(self.scenes)
         check_bundle(self.start, "--from")
         if self.replay is not None and self.start is None:
-            raise Problem("--replay needs --from: there is nothing to forget without it.", "Change that option.")
+            raise Problem(
+                "--replay needs --from: only a fine-tuning replays data.", "Add --from, or leave out --replay."
+            )
         object.__setattr__(self, "holdout", _resolve_holdout(self.holdout, self.scenes))
         if self.views is not None and not self.views.is_file():
             raise Problem(
@@ -193,7 +195,7 @@ def check_bundle_tail(tail: TailName) -> None:
     """
     if tail not in BINNED_TAILS:
         raise Problem(
-            f"A bundle cannot be made for the tail {tail}: it has no depth bins, which its cores are made of.",
+            f"A bundle cannot be made for the tail {tail}: it has no depth bins, and cores are made of depth bins.",
             f"Use one of {', '.join(BINNED_TAILS)}: --tail {DEFAULT_TAIL}.",
         )
 
@@ -322,7 +324,7 @@ def _check_budgets(budgets: Sequence[float], size: tuple[int, int] | None) -> No
     if not budgets:
         raise Problem("No budget was given.", "Give at least one, --budgets .5,1,2, or leave out --budgets.")
     if len(budgets) > LIMITS.budgets:
-        raise Problem(f"{len(budgets)} budgets are not possible.", f"Give 1 to {LIMITS.budgets}.")
+        raise Problem(f"{len(budgets)} budgets are too few or too many.", f"Give 1 to {LIMITS.budgets}.")
     for budget in budgets:
         check_budget(budget, "--budgets .5,1,2", size)
 

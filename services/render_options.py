@@ -83,13 +83,15 @@ class RenderOptions:
     def __post_init__(self) -> None:
         for side in (self.image_width, *(self.size or ())):
             if not 1 <= side <= LIMITS.max_side:
-                raise Problem(f"{side} pixels are no side of a picture.", f"Give 1 to {LIMITS.max_side} pixels.")
+                raise Problem(
+                    f"Invalid size: {side} pixels.", f"Give width and height of 1 to {LIMITS.max_side} pixels."
+                )
         check_budget(self.budget, "--budget 2", self.size)
         check_bundle(self.bundle, "--bundle")
         check_steepness(self.g, has_bundle=self.bundle is not None, is_tail_named=self.tail is not None)
         if self.output is not None:
             if self.output.suffix.lower() not in SUFFIXES:
-                raise Problem(f"{self.output} is no name of a picture.", "End it in .png or .exr.")
+                raise Problem(f"{self.output} is not the name of a picture.", "End it in .png or .exr.")
             check_pattern(self.output, self.frames)
 
 
@@ -145,7 +147,7 @@ def parse_times(frames: str | None, default_time: bool) -> tuple[float, ...]:
         Problem: Both are given, or the frames are none.
     """
     if frames is not None and default_time:
-        raise Problem("Both --frames and --defaultTime say when.", "Leave one of them out.")
+        raise Problem("Both --frames and --defaultTime set the time.", "Leave one of them out.")
     if default_time:
         return (math.nan,)
     return () if frames is None else parse_frames(frames)
@@ -180,7 +182,7 @@ def parse_refine(complexity: str | None, refine: int | None) -> int:
         Problem: Both are given, or there is no such word.
     """
     if complexity is not None and refine is not None:
-        raise Problem("Both --complexity and --refine say how far to refine.", "Leave one of them out.")
+        raise Problem("Both --complexity and --refine set the refinement.", "Leave one of them out.")
     if complexity is not None and complexity not in COMPLEXITIES:
         raise Problem(f"There is no complexity '{complexity}'.", f"Use one of {', '.join(COMPLEXITIES)}.")
     return COMPLEXITIES[complexity] if complexity is not None else refine or 0
@@ -200,7 +202,9 @@ def parse_background(text: str) -> RGB:
     except ValueError:
         red = green = blue = math.nan
     if not all(0.0 <= value <= 1.0 for value in (red, green, blue)):
-        raise Problem(f"'{text}' is no colour.", "Write it like '#ffffff', or as linear red,green,blue: 0.5,0.5,0.5.")
+        raise Problem(
+            f"'{text}' is not a colour.", "Write it like '#ffffff', or as linear red,green,blue: 0.5,0.5,0.5."
+        )
     return red, green, blue
 
 
@@ -219,7 +223,7 @@ def parse_vkb(text: str) -> VkbOptions:
     for word in words:
         factor = word.removeprefix("no-")
         if word != "thesis" and (factor == word or factor not in _FACTORS):
-            raise Problem(f"--vkb '{word}' is no switch.", f"Use thesis, {', '.join(f'no-{f}' for f in _FACTORS)}.")
+            raise Problem(f"--vkb '{word}' is not a switch.", f"Use thesis, {', '.join(f'no-{f}' for f in _FACTORS)}.")
         if factor == "noise":
             options = replace(options, noise=0.0)
         elif word != "thesis":

@@ -76,7 +76,7 @@ app.command("health")(health.health)
 
 
 @app.command("version")
-def version(as_json: bool = typer.Option(False, "--json", help="One JSON object on stdout.")) -> None:
+def version(as_json: bool = typer.Option(False, "--json", help="Print one JSON object on stdout.")) -> None:
     """Version of Diaphane and of the libraries that can change a result."""
     from services.versions import library_versions
 

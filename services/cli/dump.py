@@ -33,9 +33,12 @@ if TYPE_CHECKING:
 def dump(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A scene, or a deep OpenEXR file to import.")],
     target: Annotated[
-        Path, typer.Option("--output", "-o", help="Folder of the dump; or a deep OpenEXR file, if it ends in .exr.")
+        Path,
+        typer.Option(
+            "--output", "-o", help="Write the dump to this folder, or to a deep OpenEXR file if it ends in .exr."
+        ),
     ],
-    is_deep: Annotated[bool, typer.Option("--exr", help="Also a deep OpenEXR file in the folder.")] = False,
+    is_deep: Annotated[bool, typer.Option("--exr", help="Also write a deep OpenEXR file into the folder.")] = False,
     camera: CameraOption = None,
     time: TimeOption = None,
     image_width: WidthOption = 960,

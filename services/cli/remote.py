@@ -94,7 +94,7 @@ class Remote:
         # The part had arrived, and the answer was lost: the upload itself says where it is.
         state = self._json("GET", path)
         if int(state.get("received", offset)) == offset and not state.get("complete"):
-            raise Problem("The server does not take the next part of the upload.", "Run it again.", ExitCode.TRY_AGAIN)
+            raise Problem("The server refuses the next part of the upload.", "Run it again.", ExitCode.TRY_AGAIN)
         return state
 
     def upload_scene(self, package: Package, advance: Callable[[str, int], None] = lambda _name, _bytes: None) -> JSON:
@@ -352,7 +352,7 @@ def _segment(text: str) -> str:
         Problem: It is none.
     """
     if not text or text in (".", "..") or not all(c.isascii() and (c.isalnum() or c in "-._") for c in text):
-        raise Problem(f"'{text}' is no name or id.", "Copy it from the list of what there is.")
+        raise Problem(f"'{text}' is not a name or id.", "Copy it from the output of the list command.")
     return text
 
 

@@ -13,13 +13,15 @@ if TYPE_CHECKING:
 DEFAULT_URL = "http://127.0.0.1:8035"
 URL_VARIABLE = "DIAPHANE_URL"
 
-UrlOption = Annotated[str, typer.Option("--url", envvar=URL_VARIABLE, help="The server.")]
+UrlOption = Annotated[str, typer.Option("--url", envvar=URL_VARIABLE, help="Address of the server.")]
 # The key itself is no option: the command line of a process can be read by everybody on the machine.
 KeyFileOption = Annotated[
     Path | None,
-    typer.Option("--key-file", envvar="DIAPHANE_KEY_FILE", help="File with the API key. Default: DIAPHANE_KEY."),
+    typer.Option(
+        "--key-file", envvar="DIAPHANE_KEY_FILE", help="Read the API key from this file. Default: DIAPHANE_KEY."
+    ),
 ]
-LimitOption = Annotated[int, typer.Option("--limit", min=1, help="How many, newest first.")]
+LimitOption = Annotated[int, typer.Option("--limit", min=1, help="Show at most this many, newest first.")]
 
 
 def connect(url: str, key_file: Path | None) -> Remote:

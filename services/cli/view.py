@@ -41,7 +41,9 @@ def view(
     file: SceneArgument,
     technique: Annotated[
         str | None,
-        typer.Option("--technique", "-t", help="On the left. Default: kbuffer-deep with a bundle, else kbuffer."),
+        typer.Option(
+            "--technique", "-t", help="Technique on the left. Default: kbuffer-deep with a bundle, else kbuffer."
+        ),
     ] = None,
     against: Annotated[str, typer.Option("--against", help="Technique on the right.")] = "sbuffer",
     layout: Annotated[
@@ -58,7 +60,7 @@ def view(
         str | None, typer.Option("--bundle", help="Instead: a folder, or NAME@ALIAS of the state folder's registry.")
     ] = None,
     watch: Annotated[
-        bool, typer.Option("--watch", help="Take every bundle that the alias of --model comes to mean.")
+        bool, typer.Option("--watch", help="Follow the alias of --model while the window is open.")
     ] = False,
     public_key: Annotated[
         str | None,
@@ -76,7 +78,7 @@ def view(
     image_width: WidthOption = 960,
     picture_size: Annotated[
         str | None,
-        typer.Option("--size", help="WIDTHxHEIGHT of one picture, instead of --imageWidth; a window begins with it."),
+        typer.Option("--size", help="WIDTHxHEIGHT of one picture, instead of --imageWidth; a window starts with it."),
     ] = None,
     time: TimeOption = None,
     complexity: ComplexityOption = None,
@@ -86,15 +88,19 @@ def view(
     variant: VariantOption = None,
     background: BackgroundOption = WHITE,
     frames: Annotated[
-        int | None, typer.Option("--frames", help="No window: so many frames of a full turn; 1: the view itself.")
+        int | None,
+        typer.Option(
+            "--frames", help="Write this many frames of a full turn instead of opening a window; 1: the view itself."
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder of frames, pictures (key P) and statistics.csv (key C).")
     ] = None,
-    csv: Annotated[Path | None, typer.Option("--csv", help="File that rows of statistics are added to.")] = None,
-    flip: Annotated[bool, typer.Option("--flip", help="FLIP as well: it takes longer.")] = False,
+    csv: Annotated[Path | None, typer.Option("--csv", help="Append rows of statistics to this file.")] = None,
+    flip: Annotated[bool, typer.Option("--flip", help="Compute FLIP as well; it takes longer.")] = False,
     readout: Annotated[
-        bool | None, typer.Option("--readout/--no-readout", help="Numbers upon the picture. Default: in the window.")
+        bool | None,
+        typer.Option("--readout/--no-readout", help="Show the numbers on the picture. Default: in the window."),
     ] = None,
     state: StateOption = DEFAULT_STATE,
     url: UrlOption = DEFAULT_URL,
@@ -117,11 +123,17 @@ def view(
 
     check_bundle(model, "--model")
     if model is not None and bundle is not None:
-        raise Problem("Both --model and --bundle name a bundle.", "Leave one of them out.")
+        raise Problem("Both --model and --bundle name a bundle.", "Leave out one of them.")
     if watch and (model is None or frames is not None):
-        raise Problem("--watch follows the alias of --model in a window.", "Give --model, and no --frames.")
+        raise Problem(
+            "--watch follows the alias of --model in a window, so it needs --model and no --frames.",
+            "Add --model and leave out --frames, or leave out --watch.",
+        )
     if public_key is not None and model is None:
-        raise Problem("--public-key is that of the server of --model.", "Give --model, or leave it out.")
+        raise Problem(
+            "--public-key is the key of the server of --model, and there is no --model.",
+            "Add --model, or leave out --public-key.",
+        )
     has_bundle = model is not None or bundle is not None
     options = ViewerOptions(
         render=RenderOptions(

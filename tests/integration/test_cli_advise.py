@@ -14,7 +14,7 @@ from schemas.problem import ExitCode
 from services.cli.app import run
 
 SMALL = ["--size", "48x32", "--views", "views.json"]
-VIEW = {"eye": [2, 1, 2], "target": [0, 0, 0], "up": [0, 1, 0], "fov": 20}
+VIEW = {"eye": [120, 60, 70], "target": [0, 0, 20], "up": [0, 0, 1], "fov": 35}
 
 
 @pytest.fixture(scope="module")

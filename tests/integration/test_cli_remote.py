@@ -155,9 +155,9 @@ def test_a_rejected_scene_ends_with_the_reason(
     [
         (["scenes", "upload", "nowhere.usdz"], ExitCode.NOT_FOUND, "no file nowhere.usdz"),
         (["scenes", "upload", "notes.txt"], ExitCode.USAGE, "notes.txt is not a scene"),
-        (["scenes", "upload", "a.usdz", "copy/a.usdz", "--name", "c"], ExitCode.USAGE, "One name"),
+        (["scenes", "upload", "a.usdz", "copy/a.usdz", "--name", "c"], ExitCode.USAGE, "--name names one scene"),
         (["scenes", "show", "scn_1"], ExitCode.NOT_FOUND, "no scene scn_1"),
-        (["scenes", "show", "../jobs"], ExitCode.USAGE, "no name or id"),
+        (["scenes", "show", "../jobs"], ExitCode.USAGE, "not a name or id"),
         (["jobs", "show", "job_1"], ExitCode.NOT_FOUND, "no job job_1"),
         (["jobs", "submit", "build", "--scene", "a.usdz"], ExitCode.USAGE, "A build needs a name."),
         (["jobs", "submit", "bake", "--scene", "a.usdz"], ExitCode.USAGE, "kind"),
@@ -166,8 +166,8 @@ def test_a_rejected_scene_ends_with_the_reason(
         (["jobs", "submit", "render", "--scene", "a.usdz", "--scene", "copy/a.usdz"], ExitCode.USAGE, "the same scene"),
         (["keys", "create", "ci", "--scope", "root"], ExitCode.USAGE, "no scope 'root'"),
         (["models", "show", "glass@9.9.9"], ExitCode.NOT_FOUND, "no version or alias"),
-        (["jobs", "list", "--url", "ftp://x"], ExitCode.USAGE, "URL is not understood"),
-        (["jobs", "list", "--url", "http://me:pass@host"], ExitCode.USAGE, "carries a password"),
+        (["jobs", "list", "--url", "ftp://x"], ExitCode.USAGE, "URL is not valid"),
+        (["jobs", "list", "--url", "http://me:pass@host"], ExitCode.USAGE, "contains a password"),
         (["jobs", "list", "--key-file", "nowhere"], ExitCode.AUTH, "file nowhere cannot be read"),
         (["jobs", "list", "--key-file", "notes.txt"], ExitCode.AUTH, "does not hold an API key"),
     ],
@@ -501,7 +501,7 @@ def test_an_interrupt_while_watching_leaves_the_job_alone(server: FakeServer, fo
     _, err = child.communicate(timeout=20)
     release.set()
     assert child.returncode == ExitCode.INTERRUPTED
-    assert f"the job {job_id} goes on" in err
+    assert f"the job {job_id} continues" in err
     assert server.count("POST", "/v1/jobs/.*/cancel") == 0
 
 
