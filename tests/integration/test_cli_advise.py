@@ -37,7 +37,7 @@ def advised(capsys: pytest.CaptureFixture[str], *arguments: str) -> Advice:
 
 
 def test_it_says_what_to_use_and_leaves_a_page(scene: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["advise", str(scene), *SMALL, "--memory", "36KiB", "-o", "page.html"]) == ExitCode.OK
+    assert run(["advise", str(scene), *SMALL, "--memory", "33KiB", "-o", "page.html"]) == ExitCode.OK
     told = capsys.readouterr().out
     page = (folder / "page.html").read_text(encoding="utf-8")
     assert "the least error that fits" in told
