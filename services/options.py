@@ -220,17 +220,34 @@ def check_trained_tail(tail: TailName | None, trained: TailSpec | None) -> None:
 
 
 def check_bundle(reference: str | None, option: str) -> None:
-    """Refuse an empty name of a bundle: as a path it would be the folder that the command runs in.
+    """Refuse an empty name of a bundle, which as a path is the working folder, and a path where no folder is.
 
     Args:
         reference: A folder, or NAME@ALIAS; None: not given.
         option: Where it was given.
 
     Raises:
-        Problem: It is empty.
+        Problem: It is neither.
     """
-    if reference is not None and not reference.strip():
+    if reference is None:
+        return
+    if not reference.strip():
         raise Problem(f"{option} is empty.", f"Name a folder, or a bundle of the registry: {option} glass@champion.")
+    path = Path(reference)
+    if len(path.parts) > 1 or path.exists() or reference.startswith((".", "~")):
+        _check_folder(path, option)
+
+
+def _check_folder(path: Path, option: str) -> None:
+    if path.is_dir():
+        return
+    if path.exists():
+        raise Problem(f"{option} {path} is a file, not the folder of a bundle.", "Name the folder that it is in.")
+    raise Problem(
+        f"{option}: there is no folder {path}.",
+        f"Check the path, or name a bundle of the registry: {option} glass@champion.",
+        ExitCode.NOT_FOUND,
+    )
 
 
 def parse_licences(texts: Sequence[str], scenes: Sequence[str]) -> dict[str, str]:

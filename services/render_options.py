@@ -12,6 +12,8 @@ from typing import get_args
 import numpy as np
 
 from renderer.allocation.importance import VkbOptions
+from renderer.antialias import SAMPLES
+from renderer.aovs import CHANNELS, AovName
 from renderer.scene import LoadOptions
 from renderer.techniques import TECHNIQUES, Needs
 from renderer.techniques.kbuffer_deep import Inference
@@ -52,6 +54,8 @@ class RenderOptions:
         frames: Time codes; empty: the start of the stage. Not a number: the default time.
         load: How scenes are read; the time is that of the frame.
         background: Linear RGB where nothing opaque is.
+        samples: Frames that the mean of is a picture, one for each sample of a pixel.
+        aovs: Planes beside the picture, in EXR files.
         output: Path with a suffix of SUFFIXES, and # where a frame's number goes; None: named after the scene.
         is_full: Whether EXR channels are 32-bit instead of half floats.
         compare: Whether each picture is compared with the exact one.
@@ -75,6 +79,8 @@ class RenderOptions:
     frames: tuple[float, ...] = ()
     load: LoadOptions = field(default_factory=LoadOptions)
     background: RGB = (1.0, 1.0, 1.0)
+    samples: int = 1
+    aovs: tuple[AovName, ...] = ()
     output: Path | None = None
     is_full: bool = False
     compare: bool = False
@@ -86,6 +92,13 @@ class RenderOptions:
                 raise Problem(
                     f"Invalid size: {side} pixels.", f"Give width and height of 1 to {LIMITS.max_side} pixels."
                 )
+        if self.samples not in SAMPLES:
+            raise Problem(
+                f"A pixel cannot have {self.samples} samples.",
+                f"Use one of {', '.join(map(str, SAMPLES))}: --samples 4.",
+            )
+        if self.aovs and (self.output is None or self.output.suffix.lower() != ".exr"):
+            raise Problem("A PNG picture has no layers, which --aov asks for.", "Name an EXR picture: -o picture.exr.")
         check_budget(self.budget, "--budget 2", self.size)
         check_bundle(self.bundle, "--bundle")
         check_steepness(self.g, has_bundle=self.bundle is not None, is_tail_named=self.tail is not None)
@@ -229,6 +242,21 @@ def parse_vkb(text: str) -> VkbOptions:
         elif word != "thesis":
             options = replace(options, **{factor: False})
     return options
+
+
+def parse_aovs(names: Sequence[str]) -> tuple[AovName, ...]:
+    """Names of planes, also with commas between.
+
+    Raises:
+        Problem: There is no such plane.
+    """
+    found: list[AovName] = []
+    for name in _listed(names):
+        known = next((each for each in CHANNELS if each == name), None)
+        if known is None:
+            raise Problem(f"There is no plane '{name}'.", f"Use some of {', '.join(CHANNELS)}: --aov depth,alpha.")
+        found.append(known)
+    return tuple(dict.fromkeys(found))
 
 
 def parse_needs(vkb: str, inference: str, nodes: int | None, samples: int | None) -> Needs:

@@ -11,6 +11,7 @@ import typer
 from services.cli import output
 from services.cli.scene_options import LicenceOption
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
+from services.wording import counted
 
 if TYPE_CHECKING:
     from services.options import BuildOptions
@@ -100,7 +101,7 @@ def _show(options: BuildOptions, result: BuildResult) -> None:
         why = "No view of a scene that was held out was scored, so nothing is proven: give a second transparent scene."
         console.print(why, markup=False)
     if result.skipped:
-        skipped = ", ".join(f"{count:,} {what}" for what, count in result.skipped.items())
+        skipped = ", ".join(counted(count, what) for what, count in result.skipped.items())
         console.print(f"Skipped: {skipped}.", markup=False)
     if not result.worked:
         console.print("Nothing had to be done: every artifact was there already.", markup=False)

@@ -25,6 +25,7 @@ from services.cli.scene_options import (
     WidthOption,
 )
 from services.cli.state import JsonOption
+from services.wording import counted
 
 if TYPE_CHECKING:
     from services.dumping import Dumped
@@ -59,6 +60,8 @@ def dump(
     from services.scene_warnings import said_warnings
 
     load = loading(alpha, glass, variant, complexity, refine)
+    if not as_json:
+        output.tell_new_folder(target.parent)
     dumped = run(
         DumpOptions(
             file=file,
@@ -85,8 +88,8 @@ def _show(dumped: Dumped) -> None:
     pixels = dumped.width * dumped.height
     print(f"{dumped.width}x{dumped.height}, view {dumped.view[0] or '–'} ({dumped.view[1]})")
     print(
-        f"{dumped.fragments:,} fragments in {dumped.occupied:,} of {pixels:,} pixels, "
-        f"{dumped.fragments / pixels:.2f} a pixel, at most {dumped.most}"
+        f"{counted(dumped.fragments, 'fragments')} in {dumped.occupied:,} of {counted(pixels, 'pixels')}, "
+        f"{dumped.fragments / pixels:.2f} per pixel, at most {dumped.most}"
     )
     if dumped.passes:
         print(f"ms: {', '.join(f'{name} {ms:.1f}' for name, ms in dumped.passes.items())}")

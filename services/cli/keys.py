@@ -17,6 +17,7 @@ from services.cli import output
 from services.cli.lines import print_columns
 from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption, connect
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
+from services.wording import counted
 
 if TYPE_CHECKING:
     from services.keys import Keys
@@ -165,7 +166,7 @@ def rotate_signing(
         return
     print(done.public_key)
     say = output.err()
-    say.print(f"The registry's public key; {done.signed} versions are signed with it.", markup=False)
+    say.print(f"The registry's public key; it signs {counted(done.signed, 'versions')}.", markup=False)
     for reference in done.left:
         say.print(f"warning: {reference} had no right signature, and was left as it is.", markup=False)
     if settings.signing_key and not is_lost:

@@ -22,6 +22,8 @@ def samples(
     from renderer.samples import SAMPLES, write_samples
     from renderer.samples.deep import DEEP
 
+    if not as_json:
+        output.tell_new_folder(folder.parent)
     paths = write_samples(folder, DEEP if deep else SAMPLES)
     if as_json:
         output.print_json({"scenes": [str(path) for path in paths]})

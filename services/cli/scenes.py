@@ -38,9 +38,10 @@ def upload(
         raise Problem("--name names one scene, and several were given.", "Upload them one by one, or leave --name out.")
     packages = [pack(path, name) for path in files]
     remote = connect(url, key_file)
-    scenes = inputs.upload(remote, packages, make_progress(sys.stderr, silent=as_json))
+    progress = make_progress(sys.stderr, silent=as_json)
+    scenes = inputs.upload(remote, packages, progress)
     if wait:
-        scenes = [remote.wait_for_scene(scene["id"]) for scene in scenes]
+        scenes = inputs.await_checks(remote, [scene["id"] for scene in scenes], progress)
     _show_all(scenes, as_json=as_json)
     for path, scene in zip(files, scenes, strict=True):
         inputs.ensure_accepted(scene, str(path))

@@ -31,4 +31,6 @@ VkbOption = Annotated[
     str, typer.Option("--vkb", help="For kbuffer-importance: thesis, no-depth, no-periphery, no-fresnel, no-noise.")
 ]
 NodesOption = Annotated[int | None, typer.Option("--nodes", help="Nodes per pixel of multilayer and adaptive.")]
-SamplesOption = Annotated[int | None, typer.Option("--samples", help="Samples per pixel of stochastic.")]
+StochasticSamplesOption = Annotated[
+    int | None, typer.Option("--stochastic-samples", help="Depth samples per pixel of stochastic.")
+]

@@ -24,14 +24,14 @@ from services.cli.scene_options import (
     VariantOption,
     WidthOption,
 )
-from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption
+from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption, find_key
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
 from services.cli.technique_options import (
     BudgetOption,
     InferenceOption,
     NodesOption,
-    SamplesOption,
     SteepnessOption,
+    StochasticSamplesOption,
     TailOption,
     VkbOption,
 )
@@ -69,7 +69,7 @@ def view(
     inference: InferenceOption = "glsl",
     vkb: VkbOption = "",
     nodes: NodesOption = None,
-    samples: SamplesOption = None,
+    stochastic_samples: StochasticSamplesOption = None,
     camera: CameraOption = None,
     views: Annotated[Path | None, typer.Option("--views", help="JSON file with views of the scene.")] = None,
     view: Annotated[
@@ -139,7 +139,7 @@ def view(
         render=RenderOptions(
             scenes=(file,),
             techniques=parse_techniques([technique or ("kbuffer-deep" if has_bundle else "kbuffer")], has_bundle),
-            needs=parse_needs(vkb, inference, nodes, samples),
+            needs=parse_needs(vkb, inference, nodes, stochastic_samples),
             budget=budget,
             tail=None if tail is None else parse_tail(tail),
             g=g,
@@ -164,9 +164,9 @@ def view(
     )
     service = None
     if model is not None:
-        from services.cli.remote import read_key
-
-        service = Service(model, url, read_key(key_file), state, watch, public_key)
+        service = Service(model, url, find_key(url, key_file), state, watch, public_key)
+    if out is not None and not as_json:
+        output.tell_new_folder(out.parent)
     from services.viewer.run import view as run
 
     rows = run(options, service, make_progress(sys.stderr, silent=as_json))

@@ -18,6 +18,7 @@ from support.fake_server import KEY, PART_BYTES, FakeServer, Fault, fake_server
 
 import services
 from schemas.problem import ExitCode, Problem
+from services.cli import inputs
 from services.cli.app import run
 from services.cli.packing import pack
 from services.cli.remote import Remote, open_remote, server_sent
@@ -43,7 +44,7 @@ def server(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeServer
 
 
 def remote(server: FakeServer) -> Remote:
-    return open_remote(server.url, None)
+    return open_remote(server.url, KEY)
 
 
 def usdz(folder: Path, name: str = "glass.usdz", size: int = 2500) -> Path:
@@ -274,6 +275,19 @@ def test_a_redirect_is_not_followed(server: FakeServer) -> None:
         assert other.asked == []
 
 
+def test_an_upload_says_that_the_check_still_runs(
+    server: FakeServer, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(inputs, "_FIRST_TOLD_SECONDS", 0.0)
+    server.checks = 2
+    usdz(folder)
+    assert run(["scenes", "upload", "glass.usdz"]) == ExitCode.OK
+    captured = capsys.readouterr()
+    assert "check scenes: 1" in captured.err
+    assert "glass is still being checked (0 s); `diaphane workers` shows the queue." in captured.err
+    assert "accepted" in captured.out
+
+
 def test_the_key_is_never_shown(
     server: FakeServer, folder: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -289,10 +303,15 @@ def test_the_key_is_never_shown(
     assert KEY not in captured.out + captured.err + caplog.text + repr(transport)
 
 
-def test_the_key_comes_from_a_file(server: FakeServer, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_key_comes_from_a_file_that_only_its_owner_reads(
+    server: FakeServer, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.delenv("DIAPHANE_KEY")
     assert run(["jobs", "list"]) == ExitCode.AUTH
     (folder / "key").write_text(f"{KEY}\n")
+    assert run(["jobs", "list", "--key-file", "key"]) == ExitCode.AUTH
+    assert "chmod 600 key" in capsys.readouterr().err
+    (folder / "key").chmod(0o600)
     assert run(["jobs", "list", "--key-file", "key"]) == ExitCode.OK
 
 
