@@ -36,6 +36,8 @@ PATTERNS: Final[Mapping[str, str]] = {
     r"^[a-z](?:[a-z0-9-]{0,38}[a-z0-9])?$": "an alias: 1 to 40 small letters, digits and inner hyphens, a letter first",
     r"^[A-Za-z0-9][A-Za-z0-9.-]{0,39}$": "a version or an alias: at most 40 letters, digits, points and hyphens",
     r"^(?:[A-Za-z0-9][A-Za-z0-9.-]{0,39})?$": "a version: at most 40 letters, digits, points and hyphens, or empty",
+    r"^[1-9][0-9]{0,5}(?:KiB|MiB|GiB)$": "a memory size: a whole number and KiB, MiB or GiB, such as 64MiB",
+    r"^[1-9][0-9]{1,4}x[1-9][0-9]{1,4}$": "a picture size: WIDTHxHEIGHT in pixels, 10 to 99999 each",
     r"^[A-Za-z0-9@.:+-]{0,140}$": "exact, TECHNIQUE:BUDGET or NAME@VERSION:BUDGET",
 }
 """Pattern -> what matches it. Those of paths are not among them: what does not match one is not found."""

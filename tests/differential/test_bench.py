@@ -168,7 +168,7 @@ def test_where_the_buffers_of_the_pixels_leave_nothing_it_says_so(
     subject: Subject, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("renderer.techniques.kbuffer_importance._FACING_BYTES", 100)
-    options = BenchOptions((), ("kbuffer-importance",), Path("unused"), budgets=(0.5,), account=False)
+    options = BenchOptions((), ("kbuffer-importance",), Path("unused"), budgets=(1.0,), account=False)
     _, cells = Bench(subject, options, None).measure(planned(options, None))
     assert cells[0].problem is None
     assert cells[1].problem == "the buffers of the pixels alone take more than this memory"

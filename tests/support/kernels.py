@@ -28,7 +28,7 @@ def compile_in_turns() -> None:
         with global_compiler_lock, _turn(dispatcher):
             return compiled(dispatcher, signature)
 
-    Dispatcher.compile = compile_in_turn
+    setattr(Dispatcher, compiled.__name__, compile_in_turn)
 
 
 _held: set[Path] = set()
