@@ -35,7 +35,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 NETWORKS: dict[str, tuple[Weights, TailName]] = {
-    "default": (random_weights(1), "binned-12"),
+    "default": (random_weights(1, hidden=(32, 16)), "binned-12"),
     "importance": (random_weights(2, FEATURES[:12], (128, 64), "importance"), "binned-16"),
     "density": (random_weights(3, FEATURES[3:30], (64, 32), tail="density-16"), "density-16"),
     "linear": (random_weights(4, FEATURES[:3], (), tail="binned-8"), "binned-8"),
