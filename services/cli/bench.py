@@ -18,8 +18,8 @@ from services.cli.technique_options import (
     BudgetsOption,
     InferenceOption,
     NodesOption,
-    SamplesOption,
     SteepnessOption,
+    StochasticSamplesOption,
     VkbOption,
 )
 
@@ -61,7 +61,7 @@ def bench(
     inference: InferenceOption = "glsl",
     vkb: VkbOption = "",
     nodes: NodesOption = None,
-    samples: SamplesOption = None,
+    stochastic_samples: StochasticSamplesOption = None,
     camera: CameraOption = None,
     views: Annotated[
         Path | None, typer.Option("--views", help="JSON file with views; all that it has of a scene are measured.")
@@ -118,7 +118,7 @@ def bench(
         tails=() if tails is None else parse_tails(tails),
         g=g,
         bundle=bundle,
-        needs=parse_needs(vkb, inference, nodes, samples),
+        needs=parse_needs(vkb, inference, nodes, stochastic_samples),
         camera=camera,
         views=views,
         most_views=most_views,
@@ -133,11 +133,15 @@ def bench(
         resume=resume,
         state=state,
     )
+    from services.advice.gathered import of_bench
     from services.bench.files import write_files
     from services.bench.run import bench as run
     from services.bench.run import check_same_code, no_views
+    from services.cli.advise import show_sentences
     from services.cli.bench_table import show
 
+    if not as_json:
+        output.tell_new_folder(out.parent)
     progress = make_progress(sys.stderr, silent=as_json)
     result = run(options, shlex.join(["diaphane", *sys.argv[1:]]), progress)
     if not result.views:
@@ -149,6 +153,8 @@ def bench(
     groups = groups_of(result.views)
     for each in [*groups, *([group("All of them", result.views)] if len(groups) > 1 else [])]:
         show(each, result.device)
+    for each in groups:
+        show_sentences(of_bench(each.title, each.views))
     if note := check_same_code(result):
         progress.note(note)
     if note := said_left_out([techniques], bundle is not None):
