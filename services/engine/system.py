@@ -221,11 +221,11 @@ def once(name: str, body: Callable[[], Any]) -> Any:
         Ended: The workflow is not this process's any more; nothing is remembered.
     """
     from dbos import DBOS
-    from dbos._error import DBOSWorkflowCancelledError, DBOSWorkflowConflictIDError
+    from dbos import error as errors
 
     try:
         return DBOS.run_step({"name": name}, body)
-    except (DBOSWorkflowCancelledError, DBOSWorkflowConflictIDError) as error:
+    except (errors.DBOSWorkflowCancelledError, errors.DBOSWorkflowConflictIDError) as error:
         raise Ended(name) from error
 
 
