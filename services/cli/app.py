@@ -19,6 +19,7 @@ from typer.exceptions import Abort, Exit, TyperException
 
 from schemas.problem import ExitCode, Problem
 from services.cli import (
+    advise,
     bench,
     build,
     config,
@@ -56,6 +57,7 @@ add_command(app, "build", build.build, "schemas.options:Options")
 app.command("render")(render.render)
 app.command("view")(view.view)
 app.command("dump")(dump.dump)
+app.command("advise")(advise.advise)
 add_command(app, "bench", bench.bench, "schemas.work:Device")
 app.add_typer(scene.app, name="scene")
 app.command("samples")(samples.samples)
