@@ -7,8 +7,7 @@ from bisect import bisect_left, bisect_right
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.reference.exact import Light
-from schemas.colour import decode_gamma2
+from renderer.reference.arrivals import composited
 
 _Key = tuple[float, int]
 """Depth, and opacity so that more comes first."""
@@ -33,17 +32,10 @@ def picture(
     Returns:
         float64 [P, 3], linear RGB.
     """
-    made = decode_gamma2(background)
-    for p in range(len(made)):
-        walked = range(offsets[p + 1] - 1, offsets[p] - 1, -1)
-        light = Light.none()
-        for word in composited([(float(depth[i]), int(packed[i])) for i in walked], nodes):
-            light.add_behind(word)
-        made[p] = light.over(made[p])
-    return made
+    return composited(offsets, packed, depth, background, lambda walked: composite_order(walked, nodes))
 
 
-def composited(walked: list[tuple[float, int]], nodes: int) -> list[int]:
+def composite_order(walked: list[tuple[float, int]], nodes: int) -> list[int]:
     """Packed colours in the order in which they are composited.
 
     Args:

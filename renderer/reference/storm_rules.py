@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.reference.exact import Light
-from schemas.colour import decode_gamma2
+from renderer.reference.arrivals import composited
 
 
 def picture(
@@ -28,11 +27,9 @@ def picture(
     Returns:
         float64 [P, 3], linear RGB.
     """
-    made = decode_gamma2(background)
-    for p in range(len(made)):
-        walked = list(range(offsets[p], offsets[p + 1]))[::-1][:nodes]
-        light = Light.none()
-        for i in sorted(walked, key=lambda i: float(depth[i])):  # stable: of equal depths the newest first
-            light.add_behind(int(packed[i]))
-        made[p] = light.over(made[p])
-    return made
+    return composited(offsets, packed, depth, background, lambda walked: _nearest_first(walked[:nodes]))
+
+
+def _nearest_first(walked: list[tuple[float, int]]) -> list[int]:
+    # Stable: of equal depths the newest comes first.
+    return [word for _, word in sorted(walked, key=lambda one: one[0])]

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import moderngl
-
 from renderer.frame import Clock, Frame
 from renderer.techniques.base import Budget, Rendered
-from renderer.techniques.sums import rendered, resolve_mean
+from renderer.techniques.sums import draw_in_range, rendered, resolve_mean
 from schemas.problem import Problem
 from schemas.tail import MAX_EXPONENT
 
@@ -18,9 +16,6 @@ OVERESTIMATION = 0.25
 
 _PIXEL_BYTES = 12 + 20 + 16
 """Counts and depth range, moments, sums of weighted colour and weight."""
-
-# Storage bindings of moment/warp.glsl.
-_NEAREST, _FARTHEST = 1, 2
 
 
 class Moment:
@@ -80,18 +75,12 @@ class Moment:
         clock = Clock(frame.ctx)
         with clock.measure("moments"):
             totals, moments = frame.float_targets(1, 4)
-            self._draw(frame, "moment/moments.frag", [totals, moments])
+            draw_in_range(frame, "moment/moments.frag", [totals, moments], self._defines)
         with clock.measure("blend"):
             (colours,) = frame.float_targets(4)
             for unit, texture in enumerate((totals, moments)):
                 texture.use(unit)
-            self._draw(frame, "moment/blend.frag", [colours])
+            draw_in_range(frame, "moment/blend.frag", [colours], self._defines)
         with clock.measure("resolve"):
             image = resolve_mean(frame, colours, totals)
         return rendered(frame, image, frame.passes("opaque", "count"), clock, _PIXEL_BYTES)
-
-    def _draw(self, frame: Frame, fragment: str, targets: list[moderngl.Texture]) -> None:
-        _, nearest, farthest = frame.depth_range()
-        nearest.bind_to_storage_buffer(_NEAREST)
-        farthest.bind_to_storage_buffer(_FARTHEST)
-        frame.draw_transparent(fragment, frame.target(targets), self._defines)

@@ -8,9 +8,28 @@ import moderngl
 import numpy as np
 
 from renderer.frame import Clock, Frame
+from renderer.programs import Defines
 from renderer.screen import read_linear, resolve_screen
 from renderer.techniques.base import Rendered
 from renderer.techniques.skips import frame_skips
+
+# Storage bindings of a pixel's depth range, in every shader of these techniques.
+_NEAREST, _FARTHEST = 1, 2
+
+
+def draw_in_range(frame: Frame, fragment: str, targets: list[moderngl.Texture], defines: Defines) -> None:
+    """Draw the transparent layers with a shader that reads the depth range of each pixel.
+
+    Args:
+        frame: The view.
+        fragment: Shader file.
+        targets: What it adds to.
+        defines: Its defines.
+    """
+    _, nearest, farthest = frame.depth_range()
+    nearest.bind_to_storage_buffer(_NEAREST)
+    farthest.bind_to_storage_buffer(_FARTHEST)
+    frame.draw_transparent(fragment, frame.target(targets), defines)
 
 
 def resolve_mean(

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import moderngl
-
 from renderer.frame import Clock, Frame
 from renderer.techniques.base import Budget, Rendered
-from renderer.techniques.sums import rendered, resolve_mean
+from renderer.techniques.sums import draw_in_range, rendered, resolve_mean
 from schemas.tail import MAX_EXPONENT
 
 _PIXEL_BYTES = 12 + 4 + 64 + 16
 """Counts and depth range, absorbance, coefficients, sums of weighted colour and weight."""
 
-# Storage bindings of wavelet/place.glsl.
-_NEAREST, _FARTHEST = 1, 2
+_DEFINES = {"MAX_EXPONENT": MAX_EXPONENT}
 
 
 class Wavelet:
@@ -43,18 +40,12 @@ class Wavelet:
         clock = Clock(frame.ctx)
         with clock.measure("coefficients"):
             totals, *parts = frame.float_targets(1, 4, 4, 4, 4)
-            self._draw(frame, "wavelet/coefficients.frag", [totals, *parts])
+            draw_in_range(frame, "wavelet/coefficients.frag", [totals, *parts], _DEFINES)
         with clock.measure("blend"):
             (colours,) = frame.float_targets(4)
             for unit, texture in enumerate(parts):
                 texture.use(unit)
-            self._draw(frame, "wavelet/blend.frag", [colours])
+            draw_in_range(frame, "wavelet/blend.frag", [colours], _DEFINES)
         with clock.measure("resolve"):
             image = resolve_mean(frame, colours, totals)
         return rendered(frame, image, frame.passes("opaque", "count"), clock, _PIXEL_BYTES)
-
-    def _draw(self, frame: Frame, fragment: str, targets: list[moderngl.Texture]) -> None:
-        _, nearest, farthest = frame.depth_range()
-        nearest.bind_to_storage_buffer(_NEAREST)
-        farthest.bind_to_storage_buffer(_FARTHEST)
-        frame.draw_transparent(fragment, frame.target(targets), {"MAX_EXPONENT": MAX_EXPONENT})

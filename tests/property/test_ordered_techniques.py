@@ -164,7 +164,7 @@ def test_storm_composites_its_last_fragments_and_no_other(pixel: Fragments, node
 @given(pixel=fragments(most=20), nodes=st.integers(1, 9))
 def test_bevy_composites_every_fragment_once_and_the_farthest_in_order(pixel: Fragments, nodes: int) -> None:
     walked = pixel.keys[::-1]
-    order = bevy.composited(walked, nodes)
+    order = bevy.composite_order(walked, nodes)
     assert sorted(order) == sorted(word for _, word in walked)
     far = sorted(((z, -(word >> 24)) for z, word in walked))[-nodes:]
     depth_of: dict[int, set[tuple[float, int]]] = {}
