@@ -45,12 +45,12 @@ _SUMS = "#7b3fa0", "#c08be0"
 _LAYERS = "#6b6200", "#c9bd45"
 
 LOOKS: Final[Mapping[str, Look]] = {
-    "kbuffer": Look("fixed k (kbuffer)", "#5d6570", "#a3abb5", "square"),
-    "kbuffer-dynamic": Look("dynamic k+ (kbuffer-dynamic)", "#a8620a", "#e0a04b", "diamond"),
-    "kbuffer-importance": Look("VKB (kbuffer-importance)", "#c8322b", "#f0776f", "triangle-up"),
-    "kbuffer-deep": Look("bundle (kbuffer-deep)", "#0b62b0", "#6cb2f5", "circle"),
-    "kbuffer-temporal": Look("bundle over frames (kbuffer-temporal)", "#007d91", "#52cbe0", "triangle-right"),
-    "kbuffer-optimal": Look("oracle (kbuffer-optimal)", "#0c8457", "#4cc596", _STAR),
+    "kbuffer": Look("fixed k (kbuffer)", "#6b7280", "#8f98a3", "square"),
+    "kbuffer-dynamic": Look("dynamic k+ (kbuffer-dynamic)", "#b87a00", "#e0a04b", "diamond"),
+    "kbuffer-importance": Look("VKB (kbuffer-importance)", "#c8322b", "#e8604f", "triangle-up"),
+    "kbuffer-deep": Look("bundle (kbuffer-deep)", "#2046a8", "#4f8ef0", "circle"),
+    "kbuffer-temporal": Look("bundle over frames (kbuffer-temporal)", "#1a94c4", "#7fdcf0", "triangle-right"),
+    "kbuffer-optimal": Look("oracle (kbuffer-optimal)", "#00754a", "#4cc596", _STAR),
     "sbuffer": Look("exact (sbuffer)", *_EXACT, "cross"),
     "abuffer-list": Look("exact (abuffer-list)", *_EXACT, _BAR),
     "abuffer-array": Look("exact (abuffer-array)", *_EXACT, _SALTIRE),
@@ -67,7 +67,7 @@ LOOKS: Final[Mapping[str, Look]] = {
 """Name of a technique -> its look, in the order in which tables and pictures show them.
 
 No two share a mark, so that nothing depends on telling colours apart; the bounded techniques do not share a colour
-either. Colours have a contrast of 3 or more on their pages."""
+either, and are told apart in every kind of colour blindness. Colours have a contrast of 3 or more on their pages."""
 
 DARK: Final[Mapping[str, str]] = {
     PAGE: DARK_PAGE,

@@ -283,7 +283,7 @@ def test_pages_with_data(admin: Visitor, shown: Shown) -> None:
     scene = text[f"/scenes/{shown.scene}"]
     assert "1 234 567" in scene
     assert "<td>0.250</td><td>0.200</td><td>2.00e-01</td>" in scene
-    assert "<dt>F = 1 W H</dt><dd><strong>this bundle</strong></dd>" in scene
+    assert "<dt>F = 1 W H</dt><dd><strong>bundle (kbuffer-deep)</strong></dd>" in scene
     assert "Pack the file." in text[f"/scenes/{shown.rejected}"]
 
 
