@@ -99,7 +99,9 @@ def test_offline_allocations_are_those_of_undecided_views() -> None:
 
 
 def test_the_front_of_a_plot_is_what_a_renderer_can_run_exact_included() -> None:
-    plots = specifications(groups_of(VIEWS[:1]))
+    slow = Times(median=30.0, least=30.0, most=30.0)
+    shown = view(*(one for one in VIEWS[0].cells if one.technique != "sbuffer"), cell("sbuffer", frame=slow))
+    plots = specifications(groups_of([shown]))
     points = {point["technique"]: point for point in plots["time-error"]["data"]["values"]}
     assert {name for name, point in points.items() if point["front"]} == {"kbuffer", "kbuffer-importance", "sbuffer"}
     assert points["sbuffer"]["mse"] == 0.0
@@ -153,7 +155,7 @@ def test_a_budget_that_holds_every_fragment_is_not_called_exact() -> None:
 
 def test_the_page_shows_its_charts_without_a_network() -> None:
     html = page(result(), ["time-error"], "Two versions.")
-    assert html.count('<script type="application/json">') > 3
+    assert html.count('<script type="application/json">') == 3
     assert "vega.expressionInterpreter" in html
     assert not re.search(r'(src|href)="https?://', html)
     assert "@import" not in html
