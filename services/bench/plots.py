@@ -8,6 +8,7 @@ from services.bench.groups import ORACLE_WORDS, Group, Row, group, measured, off
 from services.report.dots import Dot, error_dots
 from services.report.fronts import MEMORY, TIME, Cost, Point, error_chart
 from services.report.vega import Spec
+from services.summary import EXACT
 
 
 def specifications(groups: Sequence[Group]) -> dict[str, Spec]:
@@ -55,7 +56,12 @@ def _dots(each: Group, factor: float) -> list[Dot]:
     rows = [row for row in measured(each.rows, "fragments") if row.key.budget_factor == factor]
     if not any(row.mse is not None for row in rows):
         return []
-    rows += [row for row in measured(each.rows, "none") if row.mse is not None or row.family == "exact"]
+    free = measured(each.rows, "none")
+    # Their pictures are the same: one stands for all.
+    rows += [
+        *sorted((row for row in free if row.family == "exact"), key=lambda row: row.key.technique != EXACT)[:1],
+        *[row for row in free if row.mse is not None],
+    ]
     dots = [
         Dot(each.title, row.key.technique, row.mse or 0.0, plain_tail(row.key))
         for row in rows

@@ -535,7 +535,10 @@ def test_static_files_are_for_ever(empty: Api) -> None:
     assert {address.rpartition("/")[2] for address in addresses} == {
         *("dashboard.css", "dashboard.js", "htmx.min.js", "icon.svg", "idiomorph-ext.min.js")
     }
-    for address in (*addresses, *map(assets.address, ("htmx.LICENSE.txt", "idiomorph.LICENSE.txt", "vega.LICENSE.txt"))):
+    for address in (
+        *addresses,
+        *map(assets.address, ("htmx.LICENSE.txt", "idiomorph.LICENSE.txt", "vega.LICENSE.txt")),
+    ):
         answer = nobody.get(address)
         assert (answer.status_code, answer.headers["cache-control"]) == (200, "public, max-age=31536000, immutable")
         assert nobody.get(address, **{"If-None-Match": answer.headers["etag"]}).status_code == 304

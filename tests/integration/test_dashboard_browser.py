@@ -256,6 +256,7 @@ def test_filters_change_the_list_and_the_address(tab: Tab, shown: Shown) -> None
 
 def test_values_of_charts_can_be_read_with_the_pointer_and_the_keyboard(tab: Tab) -> None:
     tab.page.goto("/models/glass")
+    tab.until("document.querySelectorAll('.chart[data-theme]').length === document.querySelectorAll('.chart').length")
     tip = tab.page.locator(".tip")
     assert not tip.is_visible()
     mark = tab.page.locator(".chart .mark").first

@@ -67,6 +67,7 @@
     await view.runAsync();
     await view.resize().runAsync(); // the place is as wide as it will be, now that there is something in it
     reach(place);
+    box.dataset.theme = dark.matches ? "dark" : "light";
   }
 
   // A chart is one stop of the keyboard, however many values it has; arrows go from one to the next.
