@@ -67,7 +67,7 @@ class Comparison:
         rows: A row for each technique and budget.
         best: Technique with the least error within a budget, of those that a renderer can run, over the views that
             all of these have; budgets without such views are left out.
-        front: Technique and budget of the rows that no other beats in time and error.
+        front: Technique and budget (None: of the exact technique) of the rows that no other beats in time and error.
         time: Time against error.
         memory: Memory against error.
     """

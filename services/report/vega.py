@@ -130,7 +130,7 @@ def figure(spec: Spec | None, caption: str = "") -> Markup:
     text = Markup(json.dumps(spec, separators=(",", ":")).replace("<", "\\u003c"))
     said = Markup("<figcaption>{}</figcaption>").format(caption) if caption else ""
     return Markup(
-        '<figure><div class="chart" role="group" aria-label="{}"><script type="application/json">{}</script>'
+        '<figure><div class="chart" data-label="{}"><script type="application/json">{}</script>'
         "<noscript>This chart is drawn by a script.</noscript></div>{}</figure>"
     ).format(label, text, said)
 

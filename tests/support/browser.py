@@ -147,11 +147,12 @@ class Tab:
         """What is wrong with the page for those who cannot see it, or not well, in light and in dark, or too wide."""
         found: list[str] = []
         self.settle()
-        for scheme in SCHEMES:
+        for scheme in sorted(SCHEMES, key=lambda scheme: scheme != self.scheme):
             self.page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
             self.settle()
             found += [f"{scheme}: {fault}" for audit in _AUDITS for fault in self.page.evaluate(audit)]
         self.page.emulate_media(color_scheme=self.scheme, reduced_motion="no-preference")
+        self.settle()
         wide = self.page.evaluate("document.scrollingElement.scrollWidth") - self.page.viewport_size["width"]
         return found + ([f"{wide} pixels too wide"] if wide > 0 else [])
 

@@ -74,6 +74,7 @@
   function reach(place) {
     const svg = place.querySelector("svg");
     svg.setAttribute("role", "group"); // as an image it would hide its marks
+    svg.setAttribute("aria-label", place.parentElement.dataset.label);
     svg.setAttribute("aria-description", "Arrow keys go from value to value.");
     svg.querySelectorAll(marked).forEach((mark, i) => {
       mark.classList.add("mark");
