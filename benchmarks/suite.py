@@ -63,7 +63,7 @@ def main() -> int:
         text, drawn = published()
         PAGE.write_text(text, encoding="utf-8")
         for file, svg in drawn.items():
-            (PAGE.parent / file).write_text(svg + "\n", encoding="utf-8")
+            (PAGE.parent / file).write_text(svg, encoding="utf-8")
         print(PAGE)
         return 0
     progress = make_progress(sys.stderr)
@@ -125,7 +125,7 @@ def _publish(result: BenchResult) -> None:
     (RESULTS / f"bench-{name}.jsonl").write_text(f"{head}\n{_lines(result.views)}", encoding="utf-8")
     text, drawn = published()
     for file, svg in drawn.items():
-        (PAGE.parent / file).write_text(svg + "\n", encoding="utf-8")
+        (PAGE.parent / file).write_text(svg, encoding="utf-8")
     PAGE.write_text(text, encoding="utf-8")
 
 

@@ -91,7 +91,7 @@ def _measured(measurements: Sequence[Measurement], manifest: Manifest) -> str:
     rows = [
         (
             f"{row.budget_factor:g}",
-            str(row.views - row.exact_views),
+            str(row.averaged),
             summary.number(None if row.mse is None else row.mse * 1e5),
             summary.number(row.over_baseline),
             summary.number(_over(measurements, row.budget_factor)),
@@ -108,8 +108,8 @@ def _measured(measurements: Sequence[Measurement], manifest: Manifest) -> str:
             f"{counted(len(views), 'views')} of {counted(len(scenes), 'scenes')} that it was not "
             f"trained on: {_escaped(', '.join(held))}. "
             f"Pictures of {_sizes(bounded)} are compared with the exact one as displayed. VKB (`{summary.BASELINE}`) "
-            "and the certified optimal allocation have the same tail and budget. Views whose fragments all fit a "
-            "budget are not counted; errors and ratios are geometric means.",
+            "and the certified optimal allocation have the same tail and budget. Views whose fragments all fit one "
+            "of these budgets are in no row; errors and ratios are geometric means.",
             _table(heads, rows),
             summary.sentence(measurements),
         )

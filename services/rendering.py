@@ -34,13 +34,13 @@ from schemas.colour import display8
 from schemas.problem import ExitCode, Problem
 from services.contact_sheet import ContactSheet
 from services.local_scenes import Chosen, LocalScene, as_usd
+from services.looks import title
 from services.options import ChosenTail, check_budget, check_trained_tail, chosen_tail
 from services.progress import Progress
 from services.render_options import RenderOptions
 from services.scene_warnings import said_warnings
 from services.shots import Shot, Subject, shoot
 from services.stages.pictures import write_png
-from services.summary import full_title
 from services.writing import replacing
 
 SHEET = "sheet"
@@ -326,7 +326,7 @@ def _compared(found: Picture, shot: Shot, job: _Job, options: RenderOptions) -> 
     psnr = None if error == 0.0 else metrics.psnr(error)
     milliseconds = found.milliseconds or 0.0
     caption = f"MSE {1e5 * error:.4g}e-5, {milliseconds:.1f} ms" if error else f"no error, {milliseconds:.1f} ms"
-    job.sheet.add(full_title(found.technique), caption, test, reference, (error, milliseconds))
+    job.sheet.add(title(found.technique), caption, test, reference, (error, milliseconds))
     return replace(found, mse=error, psnr=psnr, flip=metrics.flip(test, reference)[0])
 
 

@@ -14,6 +14,7 @@ from schemas.measurement import Certificate, Measurement
 from services import summary
 from services.database import Database
 from services.database.tables import measurements as table
+from services.looks import technique_order
 from services.stages.evaluate import evaluated_from
 from services.stages.pictures import stem
 from services.store import MissingArtifact, Store, canonical_json
@@ -81,7 +82,7 @@ class SeenView:
 
     def within(self, budget: float) -> list[Shot]:
         """Shots with pictures at a budget, in the order of tables."""
-        order = summary.technique_order(shot.measured.technique for shot in self.shots)
+        order = technique_order(shot.measured.technique for shot in self.shots)
         found = [s for s in self.shots if s.measured.budget_factor == budget and s.has_pictures and s != self.exact]
         return sorted(found, key=lambda shot: order.index(shot.measured.technique))
 

@@ -3,48 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 from schemas.limits import LIMITS
 from schemas.measurement import Measurement
+from services.looks import technique_order
 
 BUNDLE = "kbuffer-deep"
 BASELINE = "kbuffer-importance"
 ORACLE = "kbuffer-optimal"
 EXACT = "sbuffer"
-
-TITLES = {
-    "kbuffer": "fixed k",
-    "kbuffer-dynamic": "dynamic k+",
-    BASELINE: "VKB",
-    BUNDLE: "this bundle",
-    ORACLE: "optimal (oracle)",
-    EXACT: "exact (S-buffer)",
-}
-"""Short titles in the order in which tables and pictures show the techniques; others follow under their own names."""
+FIXED = "kbuffer"
 
 MSE_FLOOR = 1e-8
 """Means and ratios take smaller errors as this one, the last digit that tables show (0.001e-5): below it, pictures
 differ by single steps in a few pixels and a ratio would measure rounding."""
 UNFIT = "†"
 """Mark of a pool that does not fit; see `said_unfit`."""
-
-
-def technique_order(techniques: Iterable[str]) -> list[str]:
-    """Techniques without duplicates, in the order of `TITLES`, unknown ones last by name."""
-    known = list(TITLES)
-    return sorted(set(techniques), key=lambda t: (known.index(t) if t in known else len(known), t))
-
-
-def title(technique: str) -> str:
-    """Short title of a technique."""
-    return TITLES.get(technique, technique)
-
-
-def full_title(technique: str) -> str:
-    """Short title of a technique with its name: `VKB (kbuffer-importance)`; the name alone where it is the title."""
-    return technique if title(technique) == technique else f"{title(technique)} ({technique})"
 
 
 def geometric_mean(values: Sequence[float]) -> float | None:
@@ -88,14 +64,16 @@ class Row:
     Attributes:
         technique: Name of the technique; more words may follow it.
         budget_factor: F / (width * height); 0 for one that reads no budget.
-        mse: Geometric mean of max(mse, MSE_FLOOR).
+        mse: Geometric mean of max(mse, MSE_FLOOR) over the views that no budget holds entirely, lest a larger budget
+            be judged by the harder views alone; None: there is no such view.
         psnr: That mean in dB.
         flip: Arithmetic mean.
         ms: Arithmetic mean of a frame's wall time.
         pool_bytes: Largest fragment pool.
         total_bytes: Largest total.
         views: Number of views.
-        exact_views: How many of them the budget holds entirely; they are not in the means of mse, psnr and flip.
+        averaged: How many of them are in the means of mse, psnr and flip: the same ones in every budget.
+        exact_views: How many of them the budget holds entirely.
         over_baseline: Geometric mean of mse over VKB's on the same views.
     """
 
@@ -108,8 +86,14 @@ class Row:
     pool_bytes: int | None
     total_bytes: int | None
     views: int
+    averaged: int
     exact_views: int
     over_baseline: float | None
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether all its pictures are: not with the fixed k, which spreads a budget evenly, and still errs."""
+        return self.technique != FIXED and self.exact_views == self.views > 0
 
 
 def rows(measurements: Sequence[Measurement]) -> list[Row]:
@@ -119,20 +103,27 @@ def rows(measurements: Sequence[Measurement]) -> list[Row]:
     """
     bounded = [m for m in measurements if m.technique != EXACT]
     exact = [m for m in measurements if m.technique == EXACT]
+    held = _held(bounded)
     made = [
-        _row([m for m in bounded if m.technique == technique and m.budget_factor == budget], bounded)
+        _row([m for m in bounded if m.technique == technique and m.budget_factor == budget], bounded, held)
         for budget in sorted({m.budget_factor for m in bounded})
         for technique in technique_order(m.technique for m in bounded if m.budget_factor == budget)
     ]
-    return [*made, _row(exact, exact)] if exact else made
+    return [*made, _row(exact, [], ())] if exact else made
 
 
-def _row(group: list[Measurement], everything: Sequence[Measurement]) -> Row:
+def _held(bounded: Sequence[Measurement]) -> set[tuple[str, str]]:
+    """Scene and name of the views that a budget holds entirely which does not hold all of them."""
+    decided = {m.budget_factor for m in bounded if not m.exact}
+    return {(m.scene, m.view) for m in bounded if m.exact and m.budget_factor in decided}
+
+
+def _row(group: list[Measurement], everything: Sequence[Measurement], held: Collection[tuple[str, str]]) -> Row:
     technique, budget = group[0].technique, max(m.budget_factor for m in group)
     run = [m for m in group if m.skipped is None]
-    errors = compared(group)
+    errors = compared(m for m in group if (m.scene, m.view) not in held)
     mse = geometric_mean([max(m.mse or 0.0, MSE_FLOOR) for m in errors])
-    same_budget = [m for m in everything if m.budget_factor == budget]
+    same_budget = [m for m in everything if m.budget_factor == budget and (m.scene, m.view) not in held]
     return Row(
         technique=technique,
         budget_factor=budget,
@@ -143,6 +134,7 @@ def _row(group: list[Measurement], everything: Sequence[Measurement]) -> Row:
         pool_bytes=max((m.pool_bytes for m in run if m.pool_bytes is not None), default=None),
         total_bytes=max((m.total_bytes for m in run if m.total_bytes is not None), default=None),
         views=len(group),
+        averaged=len(errors),
         exact_views=sum(m.exact for m in group),
         over_baseline=geometric_mean(ratios(same_budget, technique, BASELINE)),
     )
@@ -174,6 +166,13 @@ def number(value: float | None) -> str:
         return f"{value:.2e}"
     exponent = int(f"{value:.2e}".partition("e")[2])  # after rounding: 0.9999 has that of 1.00
     return f"{value:.{max(0, 2 - exponent)}f}"
+
+
+def e5(error: float | None) -> str:
+    """An error x1e-5; what is not above `MSE_FLOOR` is known to be no more than that."""
+    if error is None or error > MSE_FLOOR:
+        return number(None if error is None else 1e5 * error)
+    return f"≤ {number(1e5 * MSE_FLOOR)}"
 
 
 def said_unfit() -> str:

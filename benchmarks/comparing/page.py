@@ -8,10 +8,11 @@ from benchmarks.comparing import tables
 from benchmarks.comparing.scenes import BUNDLE, PATH_FRAMES
 from benchmarks.comparing.work import work
 from schemas.bench import BenchResult, BenchView
-from services.bench.bars import error_bars
 from services.bench.cells import bundle_of
 from services.bench.groups import Group, groups_of, said_setting
 from services.bench.page import said_machines
+from services.bench.plots import budget_chart
+from services.report.vega import svg
 from services.summary import UNFIT, said_unfit
 
 PAPER = ("minecraft_village_caves", 2.0), ("sponza", 4.0)
@@ -48,8 +49,10 @@ def page(found: Mapping[str, BenchResult], drawn: Mapping[tuple[str, str], str])
         "what its own buffers leave of it (DHOIT, Eq. 1). Times are medians of repeats in which all techniques take "
         "turns, by a clock that waits for each pass, which the next section names; readbacks are a pass of their own; "
         "the spread is the largest of (most - least) / median. Flicker is that of `diaphane bench`, over a path of "
-        f"{PATH_FRAMES} frames. Means over views are geometric for errors, arithmetic else. `kbuffer-temporal` learns "
-        "from the frames before: it is measured at rest and in motion in [TEMPORAL.md](TEMPORAL.md).\n",
+        f"{PATH_FRAMES} frames. Means over views are geometric for errors, arithmetic else; "
+        "errors and scores are over the views that no budget holds entirely, so that every budget averages the same. "
+        "`kbuffer-temporal` learns from the frames before: it is measured at rest and in motion in "
+        "[TEMPORAL.md](TEMPORAL.md).\n",
     ]
     for driver, result in found.items():
         parts += _driver(driver, result, drawn)
@@ -59,11 +62,11 @@ def page(found: Mapping[str, BenchResult], drawn: Mapping[tuple[str, str], str])
 def pictures(result: BenchResult) -> dict[str, str]:
     """Figure 6 as SVG files: name -> text."""
     made = {
-        _figure(views, factor): error_bars(groups_of(views), factor, standalone=True)
+        _figure(views, factor): budget_chart(groups_of(views), factor)
         for views in _settings(result)
         for factor in FACTORS
     }
-    return {name: svg for name, svg in made.items() if svg}
+    return {name: svg(spec, width=800) for name, spec in made.items() if spec is not None}
 
 
 def _driver(driver: str, result: BenchResult, drawn: Mapping[tuple[str, str], str]) -> list[str]:

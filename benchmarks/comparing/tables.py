@@ -20,7 +20,8 @@ from services.bench.groups import (
     said_technique,
     title_of,
 )
-from services.summary import UNFIT, geometric_mean, mean, number
+from services.looks import title
+from services.summary import ORACLE, UNFIT, e5, geometric_mean, mean, number
 
 FEATURES, IMPORTANCE, BUFFER, READBACK = "feature extraction", "importance", "k-buffer", "readback"
 STAGES = (FEATURES, IMPORTANCE, BUFFER, READBACK)
@@ -67,9 +68,9 @@ def errors(groups: Sequence[Group], factor: float) -> str:
     for each in groups:
         found = {said_technique(row.key): row.mse for row in _at(each, factor)}
         best = {mark.rule: mark.mse for mark in offline(each) if mark.budget_factor == factor}
-        least = min((mse for name, mse in found.items() if mse and "optimal" not in name), default=None)
-        cells = [_bold(found.get(name), None if "optimal" in name else least) for name in names]
-        lines.append([scene_of(each), *cells, *(_e5(best.get(mark)) for mark in marks)])
+        least = min((mse for name, mse in found.items() if mse and title(ORACLE) not in name), default=None)
+        cells = [_bold(found.get(name), None if title(ORACLE) in name else least) for name in names]
+        lines.append([scene_of(each), *cells, *(e5(best.get(mark)) for mark in marks)])
     return table(("scene", *names, *marks), lines)
 
 
@@ -157,7 +158,7 @@ def everything(views: Sequence[BenchView], factor: float) -> str:
                 NOT_MEASURED if row.spread is None else f"{100.0 * row.spread:.0f} %",
                 NOT_MEASURED if row.pixel_bytes is None else str(row.pixel_bytes),
                 NOT_MEASURED if row.total_bytes is None else f"{row.total_bytes / 2**20:.1f}",
-                "exact" if row.family == "exact" else _e5(row.mse),
+                "exact" if row.family == "exact" else e5(row.mse),
                 NOT_MEASURED if row.psnr is None else f"{row.psnr:.1f}",
                 NOT_MEASURED if row.ssim is None else f"{row.ssim:.4f}",
                 NOT_MEASURED if row.flip is None else f"{row.flip:.4f}",
@@ -202,12 +203,12 @@ def losses(groups: Sequence[Group], name: str) -> str:
         for factor in sorted({row.key.budget_factor or 0.0 for row in rows}):
             found = {said_technique(row.key): row for row in rows if row.key.budget_factor == factor}
             best = min(found, key=lambda one: found[one].mse or 0.0)
-            least, own = found[best], found.get(name)
+            least, own = found[best], found.get(title(name))
             if own is not None and (own.mse or 0.0) > ALIKE * (least.mse or 0.0):
                 over = (own.mse or 0.0) / (least.mse or 1.0)
-                line = (each.title, f"{factor:g} WH", _e5(own.mse), best, _e5(least.mse), number(over))
+                line = (each.title, f"{factor:g} WH", e5(own.mse), best, e5(least.mse), number(over))
                 lost.append((over, line))
-    head = ("scene", "F", f"MSE ×1e-5 of {name}", "least by", "MSE ×1e-5", "times")
+    head = ("scene", "F", f"MSE ×1e-5 of {title(name)}", "least by", "MSE ×1e-5", "times")
     return table(head, (line for _, line in sorted(lost, reverse=True))) if lost else "Nowhere.\n"
 
 
@@ -244,16 +245,12 @@ def _worst(views: Sequence[BenchView], rows: Sequence[Row]) -> str:
         for cell in view.cells:
             if cell.score is not None and cell.key in keys:
                 found.setdefault(title_of(view), []).append(cell.score)
-    means = {title: geometric_mean(values) or 0.0 for title, values in found.items()}
+    means = {name: geometric_mean(values) or 0.0 for name, values in found.items()}
     if not means:
         return NOT_MEASURED
-    title = max(means, key=lambda name: means[name])
-    return f"{number(means[title])} ({title})"
-
-
-def _e5(mse: float | None) -> str:
-    return number(None if mse is None else 1e5 * mse)
+    worst = max(means, key=lambda name: means[name])
+    return f"{number(means[worst])} ({worst})"
 
 
 def _bold(mse: float | None, least: float | None) -> str:
-    return f"**{_e5(mse)}**" if mse is not None and mse == least else _e5(mse)
+    return f"**{e5(mse)}**" if mse is not None and mse == least else e5(mse)

@@ -8,8 +8,9 @@ from typing import Any
 
 from benchmarks import markdown
 from benchmarks.labelling.certified import MOST_GAP
-from benchmarks.labelling.plot import Labels, log_log
 from benchmarks.provenance import said, said_load
+from services.report.lines import log_log
+from services.report.vega import svg
 
 _TIME_PLOT, _MEMORY_PLOT = "labeller-time.svg", "labeller-memory.svg"
 Found = Mapping[str, Any]
@@ -45,10 +46,11 @@ def plots(found: Found) -> dict[str, str]:
     memory = {name: [(c["fragments"], max(c["peak_bytes"], 1) / 2**20) for c in group] for name, group in _kinds(costs)}
     memory["the dump itself"] = [(c["fragments"], c["dump_bytes"] / 2**20) for c in costs if c["rule"] == "optimal"]
     return {
-        _TIME_PLOT: log_log(Labels("Time of labelling against the number of fragments", "fragments", "seconds"), time),
-        _MEMORY_PLOT: log_log(
-            Labels("Peak memory of labelling against the number of fragments", "fragments", "MiB above the input"),
-            memory,
+        _TIME_PLOT: svg(log_log("Time of labelling against the number of fragments", ("fragments", "seconds"), time)),
+        _MEMORY_PLOT: svg(
+            log_log(
+                "Peak memory of labelling against the number of fragments", ("fragments", "MiB above the input"), memory
+            )
         ),
     }
 

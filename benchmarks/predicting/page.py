@@ -8,10 +8,11 @@ from typing import Any, Final
 
 from benchmarks import markdown
 from benchmarks.casting.cases import MODES
-from benchmarks.labelling.plot import Labels, Points, log_log
 from benchmarks.predicting.summary import cost_of, front, score
 from benchmarks.predicting.views import MOST_SHARE, MULTIPLES
 from benchmarks.provenance import said
+from services.report.lines import Points, log_log
+from services.report.vega import svg
 
 Found = Mapping[str, Any]
 
@@ -84,9 +85,14 @@ def plots(found: Found, name: str) -> dict[str, str]:
         series: dict[str, Points] = {"front": [points[variant] for variant in front(points)]}
         for tail in sorted({row["tail"] for row in variants.values()}):
             series[tail] = [points[variant] for variant, row in variants.items() if row["tail"] == tail]
-        labels = Labels(f"Score against {title}", title, "score (1: DHOIT's oracle)")
-        made[f"{name}-{file}.svg"] = log_log(
-            labels, series, proportional=False, apart=[tail for tail in series if tail != "front"]
+        made[f"{name}-{file}.svg"] = svg(
+            log_log(
+                f"Score against {title}",
+                (title, "score (1: DHOIT's oracle)"),
+                series,
+                proportional=False,
+                apart=[tail for tail in series if tail != "front"],
+            )
         )
     return made
 

@@ -8,6 +8,7 @@ from typing import Final
 
 from schemas.advice import Advice, Candidate, Choice, Work
 from services.advice.rules import shown_instead
+from services.looks import title
 from services.summary import EXACT, MSE_FLOOR, number
 
 HEADINGS: Final = ("technique", "budget", "MiB", "MSE e-5", "within the memory", "tail", "worst view")
@@ -133,7 +134,7 @@ def said(one: Candidate) -> str:
     parts = [f"budget {one.budget:g}" if one.budget is not None else "", f"{one.tail} tail" if one.tail else ""]
     parts.append(f"bundle {one.bundle}" if one.bundle else "")
     told = ", ".join(part for part in parts if part)
-    return f"{one.technique} ({told})" if told else one.technique
+    return f"{title(one.technique)}, {told}" if told else title(one.technique)
 
 
 def said_error(mse: float) -> str:
@@ -165,7 +166,7 @@ def table(advice: Advice) -> list[list[str]]:
         budget = "–" if one.budget is None else f"{one.budget:g}"
         worst = "–" if one.is_exact else f"{said_mse(max(one.worst, MSE_FLOOR))}, {one.worst_view}"
         measured = _mib(one, choice), said_mse(one.mse), _place(one, choice)
-        rows.append([one.technique, budget, *measured, one.tail or "–", worst])
+        rows.append([title(one.technique), budget, *measured, one.tail or "–", worst])
     return rows
 
 
@@ -197,7 +198,7 @@ def work_rows(advice: Advice) -> list[list[str]]:
 
 
 def _work(one: Work) -> list[str]:
-    return [one.technique, str(one.geometry_passes), *map(number, (one.shaded, one.moved_bytes, one.atomics))]
+    return [title(one.technique), str(one.geometry_passes), *map(number, (one.shaded, one.moved_bytes, one.atomics))]
 
 
 def commands(advice: Advice, asked: Asked) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from services.bench.groups import groups_of
 from services.bench.page import page
 from services.bench.plots import specifications
 from services.bench.run import check_same_code
+from services.report.vega import svg
 from services.writing import replacing
 
 RESULT = "bench.json"
@@ -17,11 +18,12 @@ PAGE = "index.html"
 
 
 def write_files(folder: Path, result: BenchResult) -> None:
-    """`bench.json`, the Vega-Lite plots and the page, each complete or as it was before."""
+    """`bench.json`, the charts as Vega-Lite and as SVG, and the page, each complete or as it was before."""
     plots = specifications(groups_of(result.views))
     texts = {
         RESULT: result.model_dump_json(indent=1, exclude_defaults=True),
-        **{name: json.dumps(plot, indent=1) for name, plot in plots.items()},
+        **{f"{name}.vl.json": json.dumps(spec, indent=1) for name, spec in plots.items()},
+        **{f"{name}.svg": svg(spec).rstrip() for name, spec in plots.items()},
         PAGE: page(result, list(plots), check_same_code(result)),
     }
     for name, text in texts.items():

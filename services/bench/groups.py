@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 from renderer.techniques import TECHNIQUES
 from schemas.bench import BenchCell, BenchView, CellKey
 from schemas.tail import DEFAULT_TAIL, DENSITY_G
 from services.bench.account import Account, account_of
+from services.report.fronts import said
 from services.summary import MSE_FLOOR, ORACLE, geometric_mean, mean
 
 ORDER = list(TECHNIQUES)
@@ -24,7 +25,9 @@ class Row:
         key: The cell.
         family: Of the technique.
         views: Number of views it was measured on.
-        exact_views: How many of them its budget holds entirely; these are in no error.
+        averaged: How many of them are in its errors and scores: those that no budget holds entirely, so that all
+            budgets average the same ones.
+        exact_views: How many of them its budget holds entirely.
         mse: See `schemas.bench.BenchCell`, with a floor of `services.summary.MSE_FLOOR`; None for exact techniques.
         mse_linear: Likewise.
         mse_occupied: Likewise.
@@ -53,6 +56,7 @@ class Row:
     key: CellKey
     family: str
     views: int
+    averaged: int
     exact_views: int
     mse: float | None
     mse_linear: float | None
@@ -128,6 +132,8 @@ class Offline:
 def offline(shown: Group) -> list[Offline]:
     """Oracle and certified optima of a group, by budget."""
     marks = [(mark, view) for view in shown.views for mark in view.yardsticks if mark.budget < view.fragments]
+    held = _held(shown.views)["fragments"]
+    marks = [(mark, view) for mark, view in marks if view.key not in held] or marks
     keys = sorted({(mark.budget_factor, mark.rule, mark.tail, mark.g or 0.0) for mark, _ in marks})
     made = []
     for factor, rule, tail, g in keys:
@@ -150,8 +156,24 @@ def groups_of(views: Sequence[BenchView]) -> list[Group]:
 def group(title: str, views: Sequence[BenchView]) -> Group:
     """Rows over some views."""
     keys = dict.fromkeys(cell.key for view in views for cell in view.cells)
-    rows = [_row(key, [(view, cell) for view in views for cell in view.cells if cell.key == key]) for key in keys]
+    held = _held(views)
+    rows = [
+        _row(key, [(view, cell) for view in views for cell in view.cells if cell.key == key], held[key.basis])
+        for key in keys
+    ]
     return Group(title, tuple(views), tuple(sorted(rows, key=_place)))
+
+
+def _held(views: Sequence[BenchView]) -> dict[str, set[str]]:
+    """Basis -> keys of the views that a budget holds entirely which does not hold all of them."""
+    cells = [(view, cell) for view in views for cell in view.cells if cell.problem is None]
+    decided = {(cell.basis, cell.budget_factor) for _, cell in cells if not cell.exact}
+    held: dict[str, set[str]] = {"fragments": set(), "memory": set()}
+    for view, cell in cells:
+        if cell.basis in held and cell.exact and (cell.basis, cell.budget_factor) in decided:
+            held[cell.basis].add(view.key)
+    # What has no budget stands beside what has one.
+    return {**held, "none": held["fragments"]}
 
 
 def title_of(view: BenchView) -> str:
@@ -182,9 +204,14 @@ def said_budget(key: CellKey) -> str:
 
 
 def said_technique(key: CellKey) -> str:
-    """Technique with its tail, where that is not the default."""
+    """Title of a technique with its tail, where that is not the default."""
+    return said(key.technique, plain_tail(key))
+
+
+def plain_tail(key: CellKey) -> str:
+    """Tail of a cell; '' for the default."""
     tail = said_tail(key)
-    return key.technique if tail in ("", DEFAULT_TAIL) else f"{key.technique} ({tail})"
+    return "" if tail == DEFAULT_TAIL else tail
 
 
 def said_tail(key: CellKey) -> str:
@@ -212,11 +239,12 @@ def _place(row: Row) -> tuple[int, float, int, str, str, str]:
     )
 
 
-def _row(key: CellKey, found: Sequence[tuple[BenchView, BenchCell]]) -> Row:
+def _row(key: CellKey, found: Sequence[tuple[BenchView, BenchCell]], held: Collection[str]) -> Row:
     every = [cell for _, cell in found]
     there = [(view, cell) for view, cell in found if cell.problem is None]
     cells = [cell for _, cell in there]
-    decided = [cell for cell in cells if not cell.exact]
+    decided = [cell for view, cell in there if not cell.exact and view.key not in held]
+    decided = decided or [cell for cell in cells if not cell.exact]
     is_exact = TECHNIQUES[key.technique].family == "exact"
     mse = None if is_exact else _geometric(decided, lambda cell: cell.mse)
     shares = [(cell.captured_fragments or 0) / view.fragments for view, cell in there if view.fragments]
@@ -228,7 +256,8 @@ def _row(key: CellKey, found: Sequence[tuple[BenchView, BenchCell]]) -> Row:
         key=key,
         family=TECHNIQUES[key.technique].family,
         views=len(cells),
-        exact_views=len(cells) - len(decided),
+        averaged=len(decided),
+        exact_views=sum(cell.exact for cell in cells),
         mse=mse,
         mse_linear=None if is_exact else _geometric(decided, lambda cell: cell.mse_linear),
         mse_occupied=None if is_exact else _geometric(decided, lambda cell: cell.mse_occupied),

@@ -3,46 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import groupby
 
 from schemas.bench import BenchResult, BenchView
 from services.advice.gathered import of_bench
 from services.advice.page import part
 from services.bench.account import said_device
-from services.bench.bars import error_bars
 from services.bench.groups import (
-    Group,
     Row,
     group,
     groups_of,
-    measured,
     offline,
     said_budget,
     said_technique,
 )
-from services.report import charts
+from services.bench.plots import budget_chart, cost_chart
+from services.report.fronts import MEMORY, TIME
 from services.report.page import environment
 from services.summary import UNFIT, said_unfit
-from services.summary import Row as ChartRow
-
-
-@dataclass(frozen=True, slots=True)
-class Drawn:
-    """Charts of a group.
-
-    Attributes:
-        svgs: Time against error, memory against error.
-        legend: Marks of their techniques, HTML.
-    """
-
-    svgs: tuple[str, ...]
-    legend: str
-
-    @property
-    def any(self) -> bool:
-        """Whether there is something to see."""
-        return any(self.svgs)
 
 
 def page(result: BenchResult, plots: Sequence[str], mixed: str | None) -> str:
@@ -55,7 +33,7 @@ def page(result: BenchResult, plots: Sequence[str], mixed: str | None) -> str:
     """
     groups = groups_of(result.views)
     factors = sorted({cell.budget_factor for view in result.views for cell in view.cells if cell.budget_factor})
-    figures = [(factor, svg) for factor in factors if (svg := error_bars(groups, factor))]
+    figures = [(factor, spec) for factor in factors if (spec := budget_chart(groups, factor))]
     shown = [group("All of them", result.views), *groups] if len(groups) > 1 else groups
     return (
         environment()
@@ -70,7 +48,7 @@ def page(result: BenchResult, plots: Sequence[str], mixed: str | None) -> str:
             groups=shown,
             advice=[(each.title, part(of_bench(each.title, each.views))) for each in groups],
             plots=plots,
-            charts=charts_of,
+            charts=lambda of: [spec for cost in (TIME, MEMORY) if (spec := cost_chart(of, cost))],
             by_budget=_by_budget,
             offline=offline,
             said=said_technique,
@@ -84,15 +62,6 @@ def page(result: BenchResult, plots: Sequence[str], mixed: str | None) -> str:
     )
 
 
-def charts_of(shown: Group) -> Drawn:
-    """Time against error, and memory against error, at equal fragments."""
-    rows = [_chart_row(row) for row in (*measured(shown.rows, "none"), *measured(shown.rows, "fragments"))]
-    svgs = [charts.error_chart(rows, shown.title, cost) for cost in (charts.TIME, charts.MEMORY)]
-    # Points without a budget have their names beside them.
-    numbered = [row.technique for row in rows if row.budget_factor]
-    return Drawn(tuple(svg for svg in svgs if svg), charts.legend(numbered))
-
-
 def said_machines(views: Sequence[BenchView]) -> list[str]:
     """Machines, drivers and clocks of views in words, each with the commits that it measured."""
     commits: dict[str, dict[str, None]] = {}
@@ -104,19 +73,3 @@ def said_machines(views: Sequence[BenchView]) -> list[str]:
 
 def _by_budget(rows: Sequence[Row]) -> list[tuple[str, list[Row]]]:
     return [(budget, list(found)) for budget, found in groupby(rows, lambda row: said_budget(row.key))]
-
-
-def _chart_row(row: Row) -> ChartRow:
-    return ChartRow(
-        technique=said_technique(row.key),
-        budget_factor=row.key.budget_factor or 0.0,
-        mse=row.mse,
-        psnr=row.psnr,
-        flip=row.flip,
-        ms=row.ms,
-        pool_bytes=row.pool_bytes,
-        total_bytes=row.total_bytes,
-        views=row.views,
-        exact_views=row.exact_views,
-        over_baseline=None,
-    )

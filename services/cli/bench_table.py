@@ -6,7 +6,7 @@ from schemas.work import Device
 from services.bench.account import COLUMNS, said_device
 from services.bench.groups import Group, Row, offline, said_budget, said_technique
 from services.cli.lines import print_columns, size
-from services.summary import MSE_FLOOR, UNFIT, number, said_unfit
+from services.summary import UNFIT, e5, number, said_unfit
 from services.wording import counted
 
 
@@ -35,7 +35,7 @@ def show(shown: Group, device: Device) -> None:
                 [
                     mark.rule,
                     f"F = {mark.budget_factor:g} WH",
-                    _e5(mark.mse),
+                    e5(mark.mse),
                     None if mark.gap is None else f"{mark.gap:.1e}",
                     f"{mark.captured:,.0f}",
                     f"{mark.k[0]}..{mark.k[1]}",
@@ -74,7 +74,13 @@ def _cells(row: Row, with_path: bool) -> list[str | None]:
         return [said, *[None] * 10, *_bytes(row), *[None] * with_path]
     spread = f" ±{50.0 * row.spread:.0f} %" if row.spread else ""
     time = None if row.ms is None else f"{row.ms:.1f}{spread}"
-    errors = [_e5(row.mse), _e5(row.mse_linear), _e5(row.mse_occupied), number(row.score), number(row.over_optimum)]
+    errors: list[str | None] = [
+        e5(row.mse),
+        e5(row.mse_linear),
+        e5(row.mse_occupied),
+        number(row.score),
+        number(row.over_optimum),
+    ]
     if row.family == "exact":
         errors = ["exact", None, None, None, None]
     elif row.views and row.exact_views == row.views:
@@ -100,9 +106,3 @@ def _bytes(row: Row) -> tuple[str | None, str | None]:
         None if row.pool_bytes is None else size(row.pool_bytes) + mark,
         None if row.total_bytes is None else size(row.total_bytes),
     )
-
-
-def _e5(error: float | None) -> str | None:
-    if error is None or error > MSE_FLOOR:
-        return None if error is None else number(1e5 * error)
-    return f"≤ {number(1e5 * MSE_FLOOR)}"

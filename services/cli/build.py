@@ -81,6 +81,7 @@ def _show(options: BuildOptions, result: BuildResult) -> None:
     from rich.table import Table
 
     from services import summary
+    from services.looks import title
 
     console = output.out()
     held_out = [m for m in result.measurements if m.scene in result.held_out]
@@ -94,7 +95,7 @@ def _show(options: BuildOptions, result: BuildResult) -> None:
             scaled = None if row.mse is None else row.mse * 1e5
             values = (scaled, row.over_baseline, row.psnr, row.flip, row.ms)
             cells = [summary.number(value) for value in values]
-            table.add_row(summary.number(row.budget_factor), summary.title(row.technique), *cells)
+            table.add_row(summary.number(row.budget_factor), title(row.technique), *cells)
         console.print(table)
         console.print(summary.sentence(held_out), markup=False)
     else:

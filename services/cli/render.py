@@ -205,7 +205,8 @@ def _memory(picture: Picture) -> str:
 
 
 def _show_ranks(ranks: Sequence[Rank]) -> None:
-    from services.summary import full_title, number
+    from services.looks import title
+    from services.summary import number
 
     asked = ranks[0].asked
     over = f", means over {counted(asked, 'pictures')}" if asked > 1 else ""
@@ -215,7 +216,7 @@ def _show_ranks(ranks: Sequence[Rank]) -> None:
         [
             [
                 place,
-                full_title(rank.technique),
+                title(rank.technique),
                 rank.family,
                 None if rank.mse is None else number(1e5 * rank.mse),
                 None if rank.psnr is None else f"{rank.psnr:.2f}",

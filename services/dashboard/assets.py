@@ -9,11 +9,13 @@ from typing import Annotated
 
 from fastapi import APIRouter, Request, Response
 from fastapi import Path as InPath
+from markupsafe import Markup
 
 from services.api.etags import is_current
 from services.problems import Refusal
 from services.report.colours import COUNT, HEAT, css_gradient
 from services.report.page import TEMPLATES
+from services.report.vega import DRAWING, FOLDER, RUNTIME
 
 HTMX = "2.0.11"
 """Version of the vendored htmx (https://htmx.org, Zero-Clause BSD); `htmx.min.js` is as released."""
@@ -33,6 +35,8 @@ _SOURCES: dict[str, tuple[str, tuple[Path, ...]]] = {
     "htmx.LICENSE.txt": ("text/plain", (_FOLDER / "htmx.LICENSE.txt",)),
     "idiomorph-ext.min.js": ("text/javascript", (_FOLDER / "idiomorph-ext.min.js",)),
     "idiomorph.LICENSE.txt": ("text/plain", (_FOLDER / "idiomorph.LICENSE.txt",)),
+    **{name: ("text/javascript", (FOLDER / name,)) for name in (*RUNTIME, DRAWING)},
+    "vega.LICENSE.txt": ("text/plain", (FOLDER / "LICENSE.txt",)),
     "icon.svg": ("image/svg+xml", (_FOLDER / "icon.svg",)),
 }
 """Name -> media type, and the files that it is made of."""
@@ -51,6 +55,13 @@ def content(name: str) -> tuple[bytes, str]:
 def address(name: str) -> str:
     """Where a page finds a file."""
     return f"/static/{content(name)[1][:16]}/{name}"
+
+
+def charts_script() -> Markup:
+    """What a page with charts has in its head; Vega itself is fetched with the first chart."""
+    return Markup('<script src="{}" data-runtime="{}" defer></script>').format(
+        address(DRAWING), " ".join(map(address, RUNTIME))
+    )
 
 
 @router.get("/{digest}/{name}", response_class=Response)

@@ -8,14 +8,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import sqlalchemy as sa
-from markupsafe import Markup
 
 from schemas.glass import DEFAULT_GLASS
 from schemas.measurement import Measurement
 from services import summary
 from services.database import Database
 from services.database.tables import measurements as table
-from services.report import charts
+from services.report.fronts import MEMORY, TIME, error_chart, front_of, points_of
+from services.report.lines import history_chart as chart_of_history
+from services.report.vega import Spec
 from services.scene_views import camera_of, setting_of
 
 WORSE = 1.05
@@ -66,18 +67,16 @@ class Comparison:
         rows: A row for each technique and budget.
         best: Technique with the least error within a budget, of those that a renderer can run, over the views that
             all of these have; budgets without such views are left out.
-        front: Technique and budget of the rows that no other beats in time and error.
-        legend: Of the charts.
+        front: Technique and budget (None: of the exact technique) of the rows that no other beats in time and error.
         time: Time against error.
         memory: Memory against error.
     """
 
     rows: list[summary.Row]
     best: dict[float, str]
-    front: frozenset[tuple[str, float]]
-    legend: Markup
-    time: Markup
-    memory: Markup
+    front: frozenset[tuple[str, float | None]]
+    time: Spec | None
+    memory: Spec | None
 
 
 def history(database: Database, name: str, versions: Sequence[str]) -> list[SceneHistory]:
@@ -121,11 +120,11 @@ def history(database: Database, name: str, versions: Sequence[str]) -> list[Scen
     return [SceneHistory(titles[scene], _compared(found[scene], shown)) for scene in sorted(found)]
 
 
-def history_chart(scenes: Sequence[SceneHistory], versions: Sequence[str]) -> Markup:
-    """The errors as a chart; empty with a single version."""
+def history_chart(scenes: Sequence[SceneHistory], versions: Sequence[str]) -> Spec | None:
+    """The errors as a chart; None with a single version."""
     series = {scene.scene: [None if error is None else error.mse for error in scene.errors] for scene in scenes}
     worse = {(scene.scene, i) for scene in scenes for i, e in enumerate(scene.errors) if e is not None and e.is_worse}
-    return Markup(charts.history_chart(series, versions, worse, "Error of each scene by version"))
+    return chart_of_history(series, versions, worse, "Error of each scene by version")
 
 
 def of_version(database: Database, reference: str) -> list[Measurement]:
@@ -152,16 +151,13 @@ def compare(measurements: Sequence[Measurement], label: str) -> Comparison:
         label: What they are of, for the charts.
     """
     rows = summary.rows(measurements)
-    runnable = [row for row in rows if row.technique != summary.ORACLE and row.mse is not None]
-    points = {(row.technique, row.budget_factor): (row.ms, row.mse) for row in runnable if row.ms and row.mse}
-    front = set(charts.pareto_front(list(points.values())))
+    points = points_of(rows, TIME)
     return Comparison(
         rows=rows,
         best=_best(measurements),
-        front=frozenset(key for key, point in points.items() if point in front),
-        legend=Markup(charts.legend([row.technique for row in rows if row.mse is not None])),
-        time=Markup(charts.error_chart(rows, label)),
-        memory=Markup(charts.error_chart(rows, label, charts.MEMORY)),
+        front=frozenset((point.technique, point.budget_factor) for point in front_of(points)),
+        time=error_chart(points, label),
+        memory=error_chart(points_of(rows, MEMORY), label, MEMORY),
     )
 
 

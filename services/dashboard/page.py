@@ -19,7 +19,7 @@ from markupsafe import Markup
 
 from schemas.service import JobRecord, KeyRecord, Scope
 from services.api.errors import refusal_for
-from services.dashboard.assets import address
+from services.dashboard.assets import address, charts_script
 from services.keys import allows
 from services.problems import Refusal
 from services.report.page import environment
@@ -170,7 +170,7 @@ def _shown(request: Request) -> str:
 @cache
 def _environment() -> Environment:
     made = environment()
-    made.globals.update(asset=address, pages=PAGES)
+    made.globals.update(asset=address, charts_script=charts_script, pages=PAGES)
     made.filters.update(when=when, duration=duration, took=_took, percent=_percent, size=_size)
     return made
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from markupsafe import Markup
 from numpy.typing import NDArray
 
 from labeller import pixel as curves
@@ -19,7 +18,8 @@ from schemas.problem import ExitCode, Problem
 from schemas.tail import MetricName, TailName
 from services.dashboard.sides import Side
 from services.kept import Kept
-from services.report import charts
+from services.report.lines import curve_chart
+from services.report.vega import Spec
 from services.stages.evaluate import evaluated_from
 from services.stages.inputs import METRIC
 from services.stages.pictures import read_png
@@ -136,7 +136,7 @@ class Looked:
         exact: `#rrggbb` of the exact colour.
         background: `#rrggbb` of what lies behind.
         rules: By budget.
-        chart: Curve and hull; empty if the pixel is exact for every k.
+        chart: Curve and hull; None if the pixel is exact for every k.
     """
 
     letters: tuple[str, ...] = ()
@@ -148,7 +148,7 @@ class Looked:
     exact: str = ""
     background: str = ""
     rules: tuple[Rules, ...] = ()
-    chart: str = ""
+    chart: Spec | None = None
 
 
 class Inspector:
@@ -234,7 +234,7 @@ class Inspector:
             exact=_hex(colours[-1]),
             background=_hex(one.background),
             rules=tuple(rules),
-            chart=_chart(errors, hull, known, rules) if one.n else "",
+            chart=_chart(errors, hull, known, rules) if one.n else None,
         )
 
     def _reader(self, artifact: str) -> DumpReader:
@@ -333,7 +333,7 @@ def _fragments(
 
 def _chart(
     errors: NDArray[np.float32], hull: Sequence[int], sides: Sequence[tuple[str, int]], rules: Sequence[Rules]
-) -> str:
+) -> Spec | None:
     chosen: dict[int, list[str]] = {}
     for letter, k in sides:
         chosen.setdefault(k, []).append(letter)
@@ -342,7 +342,7 @@ def _chart(
             if one.k is not None:
                 chosen.setdefault(one.k, []).append(f"{one.title} at {at.factor:g}")
     what = f"Error of the pixel by the number of core fragments, 0 to {len(errors) - 1}, and its lower hull"
-    return Markup(charts.curve_chart(errors.tolist(), hull, chosen, what))
+    return curve_chart(errors.tolist(), hull, chosen, what)
 
 
 def _hex(linear: NDArray[np.float64]) -> str:

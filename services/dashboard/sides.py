@@ -14,6 +14,7 @@ from services import summary
 from services.database import Database
 from services.database.tables import measurements as table
 from services.database.tables import scenes
+from services.looks import LOOKS, title
 from services.problems import Refusal
 from services.scene_views import Shot, newest, setting_of
 from services.stages.pictures import EXACT
@@ -43,7 +44,7 @@ class Side:
     @property
     def name(self) -> str:
         """What a reader calls the technique or version."""
-        return "exact" if self.is_exact else self.shot.model or summary.title(self.shot.measured.technique)
+        return "exact" if self.is_exact else self.shot.model or title(self.shot.measured.technique)
 
     @property
     def title(self) -> str:
@@ -210,6 +211,6 @@ def _key(data: dict[str, Any], model: str | None) -> str:
 
 
 def _order(side: Side, names: Sequence[str]) -> tuple[Any, ...]:
-    known, technique = list(summary.TITLES), side.shot.measured.technique
+    known, technique = list(LOOKS), side.shot.measured.technique
     rank = known.index(technique) if technique in known else len(known)
     return not side.is_exact, rank, names.index(side.name), side.shot.measured.budget_factor

@@ -8,8 +8,9 @@ from html import escape
 from pathlib import Path
 
 from schemas.measurement import TrainingPoint
-from services.report import charts
+from services.report.lines import loss_chart, training_chart
 from services.report.page import TEMPLATES
+from services.report.vega import figure, scripts
 from trainer.log import LogLine
 
 REFRESH_SECONDS = 3
@@ -32,8 +33,9 @@ def write_live(path: Path, name: str, lines: Sequence[LogLine], steps: int, *, i
     text = (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">{again}<title>{escape(name)}: training</title>'
         f"<style>{css}</style></head><body><main><h1>Training of {escape(name)}</h1>\n<p>{_state(lines, steps)}</p>\n"
-        f"<h2>Loss</h2><figure>{charts.loss_chart([(x.step, x.loss) for x in lines])}</figure>\n"
-        f"<h2>Error over the optimum</h2><figure>{charts.training_chart(history)}</figure>\n</main></body></html>\n"
+        f"<h2>Loss</h2>{figure(loss_chart([(x.step, x.loss) for x in lines]))}\n"
+        f"<h2>Error over the optimum</h2>{figure(training_chart(history))}\n</main>{scripts()}"
+        "</body></html>\n"
     )
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
     temporary.write_text(text, encoding="utf-8")

@@ -14,8 +14,11 @@ from markupsafe import Markup
 
 from schemas.measurement import Measurement, ReportData
 from services import summary
-from services.report import charts
+from services.looks import title
+from services.report.fronts import TIME, error_chart, points_of
+from services.report.lines import training_chart
 from services.report.pictures import PictureSet, plates
+from services.report.vega import Spec, figure, scripts
 from services.visible import visible
 
 TEMPLATES = Path(__file__).resolve().parent.parent / "templates"
@@ -28,13 +31,13 @@ class Section:
     Attributes:
         title: Heading.
         rows: Rows of the table.
-        chart: SVG, or '' if no times were measured.
+        chart: Time against error; None if no times were measured.
         best: (budget, column) -> least value among the techniques that could be shipped: not the oracle.
     """
 
     title: str
     rows: list[summary.Row]
-    chart: str
+    chart: Spec | None
     best: dict[tuple[float, str], float]
 
 
@@ -62,8 +65,8 @@ def write_report(
             overall=_section(f"All held-out scenes ({len(held_out)})", measured),
             by_scene=[_section(label, [m for m in measured if m.scene == label]) for label in held_out],
             trained=_section("Scenes that were trained on", trained) if trained else None,
-            legend=charts.legend([m.technique for m in summary.compared(data.measurements)]),
-            training=charts.training_chart(data.training),
+            training=training_chart(data.training),
+            has_charts=True,
             plates=plates(pictures),
             advice=advice,
             not_run=_not_run(data.measurements),
@@ -88,11 +91,11 @@ def _section(heading: str, measurements: Sequence[Measurement]) -> Section:
             if value is not None:
                 key = (row.budget_factor, column)
                 best[key] = min(value, best.get(key, value))
-    return Section(heading, rows, charts.error_chart(rows, heading), best)
+    return Section(heading, rows, error_chart(points_of(rows, TIME), heading), best)
 
 
 def _not_run(measurements: Sequence[Measurement]) -> list[tuple[str, int]]:
-    reasons = [f"{summary.title(m.technique)}: {m.skipped}" for m in measurements if m.skipped is not None]
+    reasons = [f"{title(m.technique)}: {m.skipped}" for m in measurements if m.skipped is not None]
     reasons += ["views whose fragments all fit in the budget (exact)" for m in measurements if m.exact]
     return sorted({reason: reasons.count(reason) for reason in reasons}.items())
 
@@ -107,7 +110,8 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.filters.update(number=summary.number, technique=summary.title, mib=_mib, count=_count)
+    made.filters.update(number=summary.number, e5=summary.e5, technique=title, mib=_mib, count=_count)
+    made.globals.update(figure=figure, scripts=scripts)
     return made
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from services.looks import technique_order, title
 from services.report import colours
-from services.summary import technique_order, title
 
 ERROR_RANGE = (1e-6, 1e-1)
 """The error heat map is logarithmic between these mean squared errors: about a quarter of an 8-bit step, to obvious."""

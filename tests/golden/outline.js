@@ -3,9 +3,10 @@
 () => {
   const clean = (text) => text.replace(/\s+/g, " ").trim();
   const told = (element) => {
+    if (element.parentElement.closest(".chart svg")) return null; // what has no room in a narrow chart is left out
     switch (element.localName) {
       case "img": return element.alt;
-      case "svg": return `${element.getAttribute("aria-label") ?? ""} (${element.querySelectorAll(".mark").length} marks, ${element.querySelectorAll("path, line, polyline").length} lines)`;
+      case "svg": return `${element.getAttribute("aria-label") ?? ""} (${element.querySelectorAll(".mark").length} marks)`;
       case "progress": return `${element.getAttribute("aria-label")}: ${element.value}`;
       case "input": return element.type === "hidden" ? null : `${element.type} ${element.value || element.placeholder}`;
       case "select": return element.selectedOptions[0]?.textContent ?? "";

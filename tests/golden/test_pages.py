@@ -161,9 +161,9 @@ def test_what_is_missing_is_named(chromium: Any, url: str, api: Api, shown: Show
     tab = Tab(chromium, url, 1280, "light")
     tab.sign_in(api.secrets["admin"])
     for page, change, said in (
-        ("model", "svg.chart", "missing: svg"),
+        ("model", ".chart svg", "missing: svg"),
         ("model", "table tbody tr", "missing: "),
-        ("model", "svg.chart .mark", "missing: svg"),
+        ("model", ".chart .mark", "missing: svg"),
         ("scene", ".pictures img", "missing: img"),
         ("jobs", "select", "missing: select"),
         ("job", ".node", "missing: h3"),
@@ -220,6 +220,7 @@ def _open(tab: Tab, place: str) -> None:
         "Promise.all([document.fonts.ready, ...[...document.images].filter((one) => one.src).map((one) => {"
         " one.loading = 'eager'; return one.decode(); })])"
     )
+    tab.settle()
 
 
 def _screenshot(tab: Tab) -> NDArray[np.uint8]:

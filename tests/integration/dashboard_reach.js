@@ -25,10 +25,10 @@
     const ratio = contrast(seen, under);
     if (ratio < least) found.push(`contrast ${ratio.toFixed(2)} of ${what}: ${element.outerHTML.slice(0, 60)}`);
   };
-  for (const text of document.querySelectorAll("svg.chart text, svg.curve-chart text")) {
+  for (const text of document.querySelectorAll(".chart svg text")) {
     require(4.5, getComputedStyle(text).fill, text, `the text ${text.textContent.slice(0, 20)}`);
   }
-  for (const mark of document.querySelectorAll("svg.chart .mark")) {
+  for (const mark of document.querySelectorAll(".chart svg .mark")) {
     const style = getComputedStyle(mark);
     require(3, style.fill === "none" ? style.stroke : style.fill, mark, "a mark");
   }

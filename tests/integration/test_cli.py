@@ -156,7 +156,7 @@ def test_build_prints_the_table_and_where_the_report_is(
     assert run(BUILD) == ExitCode.OK
     captured = capsys.readouterr()
     assert "Report: .diaphane/report.html" in captured.out
-    assert "this bundle" in captured.out
+    assert "bundle (kbuffer-deep)" in captured.out
     assert "Nothing had to be done" in captured.out
     assert "render: 1" in captured.err
 

@@ -283,7 +283,7 @@ def test_pages_with_data(admin: Visitor, shown: Shown) -> None:
     scene = text[f"/scenes/{shown.scene}"]
     assert "1 234 567" in scene
     assert "<td>0.250</td><td>0.200</td><td>2.00e-01</td>" in scene
-    assert "<dt>F = 1 W H</dt><dd><strong>this bundle</strong></dd>" in scene
+    assert "<dt>F = 1 W H</dt><dd><strong>bundle (kbuffer-deep)</strong></dd>" in scene
     assert "Pack the file." in text[f"/scenes/{shown.rejected}"]
 
 
@@ -535,7 +535,10 @@ def test_static_files_are_for_ever(empty: Api) -> None:
     assert {address.rpartition("/")[2] for address in addresses} == {
         *("dashboard.css", "dashboard.js", "htmx.min.js", "icon.svg", "idiomorph-ext.min.js")
     }
-    for address in (*addresses, *map(assets.address, ("htmx.LICENSE.txt", "idiomorph.LICENSE.txt"))):
+    for address in (
+        *addresses,
+        *map(assets.address, ("htmx.LICENSE.txt", "idiomorph.LICENSE.txt", "vega.LICENSE.txt")),
+    ):
         answer = nobody.get(address)
         assert (answer.status_code, answer.headers["cache-control"]) == (200, "public, max-age=31536000, immutable")
         assert nobody.get(address, **{"If-None-Match": answer.headers["etag"]}).status_code == 304

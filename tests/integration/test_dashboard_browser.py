@@ -256,20 +256,21 @@ def test_filters_change_the_list_and_the_address(tab: Tab, shown: Shown) -> None
 
 def test_values_of_charts_can_be_read_with_the_pointer_and_the_keyboard(tab: Tab) -> None:
     tab.page.goto("/models/glass")
+    tab.until("document.querySelectorAll('.chart[data-theme]').length === document.querySelectorAll('.chart').length")
     tip = tab.page.locator(".tip")
     assert not tip.is_visible()
-    mark = tab.page.locator("svg.chart .mark").first
+    mark = tab.page.locator(".chart .mark").first
     mark.hover(force=True)
     assert "e-5" in tip.inner_text()
     tab.page.keyboard.press("Escape")
     assert not tip.is_visible()
-    marks = tab.page.locator("svg.chart").first.locator(".mark")
+    marks = tab.page.locator(".chart").first.locator(".mark")
     marks.first.focus()
     for key, place in (("ArrowRight", 1), ("End", marks.count() - 1), ("ArrowDown", marks.count() - 1), ("Home", 0)):
         tab.page.keyboard.press(key)
         assert tip.inner_text() == marks.nth(place).get_attribute("aria-label")
     assert "e-5" in tip.inner_text()
-    assert tab.page.locator('svg.chart .mark[tabindex="0"]').count() == tab.page.locator("svg.chart").count()
+    assert tab.page.locator('.chart .mark[tabindex="0"]').count() == tab.page.locator(".chart").count()
     box = tip.bounding_box()
     assert box["x"] >= 0
     assert box["x"] + box["width"] <= tab.page.viewport_size["width"]
@@ -298,8 +299,8 @@ def test_faults_are_found(tab: Tab) -> None:
     """What the audit and the walk are there for, made on purpose."""
     for place, change, fault in (
         ("/jobs", "main.querySelector('select').style.borderColor = 'transparent'", "the border of"),
-        ("/models/glass", "main.querySelector('svg.chart text').style.fill = 'transparent'", "the text"),
-        ("/models/glass", "main.querySelector('svg.chart .mark').style.fill = 'transparent'", "a mark"),
+        ("/models/glass", "main.querySelector('.chart svg text').style.fill = 'transparent'", "the text"),
+        ("/models/glass", "main.querySelector('.chart svg .mark').style.fill = 'transparent'", "a mark"),
         ("/jobs", "main.querySelector('h1').outerHTML = '<h3>x</h3>'", "a level of headings is left out"),
         ("/jobs", "main.querySelector('a').style.transitionDuration = '1s'", "moves"),
         ("/jobs", "main.append(document.createElement('a'))", "no name"),

@@ -35,6 +35,9 @@ def script(name: str) -> str:
 
 
 _AUDITS = (script("dashboard_audit.js"), script("dashboard_reach.js"))
+_DRAWN = "(() => { const theme = matchMedia('(prefers-color-scheme: dark)').matches ? 'dark' : 'light';"
+_DRAWN += " return [...document.querySelectorAll('.chart')].every((one) => one.dataset.theme === theme); })()"
+"""Whether the charts of a page are drawn, in its colours."""
 _FOCUS = script("dashboard_focus.js")
 
 _FLAGS = ("--no-sandbox", "--disable-gpu", "--disable-lcd-text", "--force-color-profile=srgb")
@@ -143,18 +146,20 @@ class Tab:
     def audit(self) -> list[str]:
         """What is wrong with the page for those who cannot see it, or not well, in light and in dark, or too wide."""
         found: list[str] = []
-        self._settle()
-        for scheme in SCHEMES:
+        self.settle()
+        for scheme in sorted(SCHEMES, key=lambda scheme: scheme != self.scheme):
             self.page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
+            self.settle()
             found += [f"{scheme}: {fault}" for audit in _AUDITS for fault in self.page.evaluate(audit)]
         self.page.emulate_media(color_scheme=self.scheme, reduced_motion="no-preference")
+        self.settle()
         wide = self.page.evaluate("document.scrollingElement.scrollWidth") - self.page.viewport_size["width"]
         return found + ([f"{wide} pixels too wide"] if wide > 0 else [])
 
     def walk(self) -> list[str]:
         """What is wrong with the way of the Tab key over the page, from what has the focus, or its top, to its end."""
         found: list[str] = []
-        self._settle()
+        self.settle()
         begun = self.page.evaluate(_FOCUS)
         for place in range(begun["place"] + 1, begun["stops"]):
             self.page.keyboard.press("Tab")
@@ -165,6 +170,7 @@ class Tab:
                 found.append(f"the focus is not to be seen: {at}")
         return found
 
-    def _settle(self) -> None:
+    def settle(self) -> None:
         """Waits until the page was laid out, and its scripts have seen how."""
         self.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => setTimeout(done)))")
+        self.until(_DRAWN)

@@ -1,4 +1,4 @@
-// Parts of pages that change, values of charts, and what went wrong. Everything works without this file, but by
+// Parts of pages that change, and what went wrong. Everything works without this file, but by
 // loading the page again.
 "use strict";
 
@@ -75,54 +75,6 @@ for (const kind of ["htmx:responseError", "htmx:sendError"]) {
   });
 }
 
-// The value of the mark in a chart that is pointed at or has the focus; its <title> has it for screen readers.
-const tip = document.createElement("div");
-tip.className = "tip";
-tip.hidden = true;
-document.body.append(tip);
-
-function show(event) {
-  const mark = event.target.closest?.(".mark");
-  const title = mark?.querySelector("title");
-  tip.hidden = !title;
-  if (!title) return;
-  tip.textContent = title.textContent;
-  const place = mark.getBoundingClientRect();
-  const left = Math.min(place.right + 8, document.documentElement.clientWidth - tip.offsetWidth - 8);
-  tip.style.left = `${Math.max(8, left) + scrollX}px`;
-  tip.style.top = `${Math.max(place.top - tip.offsetHeight - 6, 4) + scrollY}px`;
-}
-for (const kind of ["pointerover", "focusin"]) document.addEventListener(kind, show);
-document.addEventListener("keydown", (event) => {
-  if (event.key === "Escape") tip.hidden = true;
-});
-
-// A chart is one stop of the keyboard, however many values it has; arrows go from one to the next.
-function reachMarks() {
-  for (const chart of document.querySelectorAll('svg.chart[role="img"]')) {
-    chart.setAttribute("role", "group"); // as an image it would hide its marks
-    chart.setAttribute("aria-description", "Arrow keys go from value to value.");
-    chart.querySelectorAll(".mark").forEach((mark, i) => {
-      mark.setAttribute("tabindex", i ? "-1" : "0");
-      mark.setAttribute("role", "img");
-      mark.setAttribute("aria-label", mark.querySelector("title").textContent);
-    });
-  }
-}
-document.addEventListener("keydown", (event) => {
-  const mark = event.target.closest?.("svg.chart .mark");
-  if (!mark || event.ctrlKey || event.metaKey || event.altKey) return;
-  const marks = [...mark.closest("svg").querySelectorAll(".mark")];
-  const [at, end] = [marks.indexOf(mark), marks.length - 1];
-  const to = { ArrowRight: at + 1, ArrowDown: at + 1, ArrowLeft: at - 1, ArrowUp: at - 1, Home: 0, End: end }[event.key];
-  if (to === undefined) return;
-  event.preventDefault();
-  const next = marks[Math.min(Math.max(to, 0), end)];
-  mark.setAttribute("tabindex", "-1");
-  next.setAttribute("tabindex", "0");
-  next.focus();
-});
-
 // What scrolls is a stop of the keyboard, if there is none in it; what does not scroll is none.
 const STOPS = "a[href], button, input, select, textarea, summary, [tabindex]";
 const scrollers = new ResizeObserver((entries) => entries.forEach((entry) => reach(entry.target)));
@@ -145,9 +97,5 @@ function watchScrollers() {
     scrollers.observe(box);
   }
 }
-function reachAll() {
-  watchScrollers();
-  reachMarks();
-}
-new MutationObserver(reachAll).observe(document.getElementById("main"), { childList: true, subtree: true });
-reachAll();
+new MutationObserver(watchScrollers).observe(document.getElementById("main"), { childList: true, subtree: true });
+watchScrollers();

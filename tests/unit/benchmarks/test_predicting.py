@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from support.dumps import random_dump
 from support.training import random_weights
 
-from benchmarks.labelling.plot import Labels, log_log
 from benchmarks.predicting.cost import network_cost
 from benchmarks.predicting.cuts import core_of, frame_events
 from benchmarks.predicting.labels import OPTIMUM, RIVALS, labels_of, oracle_of
@@ -186,10 +185,3 @@ def test_the_front_is_what_nothing_beats(points: dict[str, tuple[int, int]]) -> 
     for name, point in points.items():
         beaten = any(o[0] <= point[0] and o[1] <= point[1] and o != point for o in points.values())
         assert (name in kept) != beaten
-
-
-def test_points_of_some_series_are_not_joined() -> None:
-    series = {"front": [(1.0, 1.0), (2.0, 0.5)], "others": [(1.5, 2.0), (3.0, 3.0)]}
-    drawn = log_log(Labels("t", "x", "y"), series, proportional=False, apart=["others"])
-    assert drawn.count("<polyline") == 1
-    assert drawn.count("<circle") == 4 + 2

@@ -42,7 +42,7 @@ def test_the_suites_page_and_figures_show_its_committed_results() -> None:
     text, drawn = suite.published()
     assert text == suite.PAGE.read_text(encoding="utf-8")
     for file, svg in drawn.items():
-        assert (BENCHMARKS / file).read_text(encoding="utf-8") == svg + "\n"
+        assert (BENCHMARKS / file).read_text(encoding="utf-8") == svg
 
 
 def test_a_command_names_no_folder_of_the_machine() -> None:

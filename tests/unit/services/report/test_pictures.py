@@ -43,7 +43,7 @@ def test_squared_error_is_the_mean_over_rgb_of_display_values() -> None:
 
 def test_a_plate_has_the_exact_picture_first_and_techniques_in_order() -> None:
     (plate,) = pictures.plates([picture_set()])
-    assert plate.columns == ["exact", "fixed k", "this bundle", "weighted-average"]
+    assert plate.columns == ["exact", "fixed k (kbuffer)", "bundle (kbuffer-deep)", "weighted-average"]
     assert [strip.title.split(" ")[0] for strip in plate.strips] == ["Picture", "Squared", "FLIP", "Core"]
     assert all(len(strip.cells) == 4 for strip in plate.strips)
 
