@@ -60,7 +60,7 @@ def test_its_own_tests_pass(installed: Path) -> None:
 def test_types_are_those_of_the_api(tmp_path: Path) -> None:
     done = _run(WEB, "node", "scripts/api-types.mjs", str(tmp_path / "api.ts"))
     assert done.returncode == 0, done.stderr
-    assert (tmp_path / "api.ts").read_text() == (WEB / "src/api.ts").read_text(), "run `npm run types`"
+    assert (tmp_path / "api.ts").read_text() == (WEB / "packages/core/src/api.ts").read_text(), "run `npm run types`"
 
 
 @pytest.mark.parametrize("name", SAMPLES)
