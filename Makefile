@@ -6,7 +6,7 @@ ARGS ?=
 # The scenes that the result is judged by, and that are never trained on.
 HOLDOUT ?= bottles foliage
 
-.PHONY: help setup setup-tests quickstart bench bench-gpu check test lint format lock clean
+.PHONY: help setup setup-tests quickstart bench bench-gpu check test lint format docs lock clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -43,6 +43,9 @@ test: ## lint, and all tests, in lanes (CONTRIBUTING.md)
 format: setup ## rewrite the sources in the house style
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+docs: ## the documents as a site, with the Python reference: build/site/index.html
+	@scripts/docs.sh
 
 lock: ## all locks anew from pyproject.toml (needs uv)
 	scripts/lock.sh

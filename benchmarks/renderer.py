@@ -1,4 +1,4 @@
-"""The renderer, measured: capture against bare rasterising, reuse of a scene, the price of learning.
+"""The renderer, measured: capture against bare rasterising, reuse of a scene, whole frames by pass.
 
 python -m benchmarks.renderer --bundle FOLDER --out benchmarks/results/renderer.json --page benchmarks/RENDERER.md
 """
@@ -19,7 +19,7 @@ from benchmarks.render.page import page
 from benchmarks.render.setup import subjects
 from renderer.context import describe, gl_context
 
-PARTS = ("capture", "views", "learned")
+PARTS = ("capture", "views", "frames")
 
 
 def main() -> int:
@@ -40,8 +40,8 @@ def main() -> int:
                 found["capture"].append(measure.capture_cost(subject, arguments.rounds))
             if "views" in arguments.parts:
                 found["views"].append(measure.second_view(subject, arguments.rounds))
-            if "learned" in arguments.parts:
-                found["learned"].append(measure.learned_cost(subject, bundle, arguments.rounds))
+            if "frames" in arguments.parts:
+                found["frames"].append(measure.frame_costs(subject, bundle, arguments.rounds))
     text = page(found)
     print(text)
     write_figures(arguments.out, found)

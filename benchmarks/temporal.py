@@ -28,6 +28,7 @@ from benchmarks.markdown import table
 from benchmarks.outputs import add_outputs, write_figures, write_page
 from renderer.scene import LoadOptions
 from renderer.techniques import Budget, Needs, Technique, technique
+from renderer.timing import shared_clock
 from schemas.bundle import load_manifest
 from schemas.colour import display8
 from schemas.view import View
@@ -158,7 +159,7 @@ def _changes(views: Sequence[Subject], shots: Sequence[Shot]) -> tuple[float, fl
 
 
 def _shot(subject: Subject, made: Technique, budget: Budget) -> Shot:
-    rendered, recording = shoot(subject, made, budget)
+    rendered, recording = shoot(subject, made, budget, shared_clock(subject.gpu.ctx))
     error = subject.reference.display_error(rendered.linear.reshape(-1, 3))
     return Shot(error, display8(rendered.linear), rendered.k, recording.milliseconds)
 

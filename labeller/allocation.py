@@ -44,5 +44,12 @@ class Allocation:
 
 
 def measured(rule: RuleName, budget: int, k: NDArray[np.int32], curves: Curves) -> Allocation:
-    """An allocation with its use and error, without a bound."""
+    """An allocation with its use and error, without a bound.
+
+    Args:
+        rule: Rule that made it.
+        budget: F, fragments that could be spent.
+        k: int32 [P], core fragments of each pixel, 0 <= k <= n.
+        curves: Error curves of the view.
+    """
     return Allocation(rule, budget, k, int(k.sum(dtype=np.int64)), curves.total(k))

@@ -37,7 +37,7 @@ def allocate(
 ) -> list[Allocation]:
     """How many core fragments every pixel deserves, for each budget (METHOD section 3).
 
-    Example:
+    Examples:
         >>> import labeller, numpy as np
         >>> rgba = np.array([[200, 40, 40, 128], [40, 200, 40, 128], [40, 40, 200, 128]], np.uint8)
         >>> fragments = {"counts": [3], "rgba": rgba, "depth": [1.0, 2.0, 3.0]}

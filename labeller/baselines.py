@@ -16,7 +16,12 @@ FillName = Literal["exact", "paper"]
 
 
 def fixed(n: NDArray[np.integer], budget: int) -> NDArray[np.int32]:
-    """int32 [P]: the classic k-buffer, `k = floor(F / P)` slots for every pixel, used or not; clipped to n."""
+    """int32 [P]: the classic k-buffer, `k = floor(F / P)` slots for every pixel, used or not; clipped to n.
+
+    Args:
+        n: Integers [P], fragments of each pixel.
+        budget: F, fragments.
+    """
     return np.asarray(np.minimum(budget // max(len(n), 1), n), dtype=np.int32)
 
 

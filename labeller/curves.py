@@ -54,11 +54,19 @@ class Curves:
         return np.diff(self.offsets) - 1
 
     def at(self, k: NDArray[np.integer]) -> NDArray[np.float32]:
-        """float32 [P], `e_p(k_p)` for k int [P] with 0 <= k <= n."""
+        """float32 [P], `e_p(k_p)` for k int [P] with 0 <= k <= n.
+
+        Args:
+            k: Integers [P], core fragments of each pixel, 0 <= k <= n.
+        """
         return self.error[self.offsets[:-1] + k]
 
     def total(self, k: NDArray[np.integer]) -> float:
-        """Sum of `e_p(k_p)` over the view, in float64."""
+        """Sum of `e_p(k_p)` over the view, in float64.
+
+        Args:
+            k: Integers [P], core fragments of each pixel, 0 <= k <= n.
+        """
         return float(self.at(k).sum(dtype=np.float64))
 
 

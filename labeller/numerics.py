@@ -97,7 +97,16 @@ def add_squared(
     display: bool,
     out: NDArray[np.float64],
 ) -> None:
-    """Add the squared differences of `base + factor sums`, as display values if `display`, from `exact`: all [M]."""
+    """Add the squared differences of `base + factor sums`, as display values if `display`, from `exact`: all [M].
+
+    Args:
+        base: float64 [M], one channel of the core and of the background behind core and tail.
+        factor: float64 [M], the tail's share of the pixel, over the sum of its weights.
+        sums: float64 [M], the same channel of the tail's fragments, weighted and summed.
+        exact: float64 [M], the exact values: sRGB-encoded if `display`, else linear.
+        display: Whether to compare display values (sRGB, clamped) rather than linear ones.
+        out: float64 [M], squared differences, added to in place.
+    """
     if display:
         for i in range(len(out)):
             difference = display_of(base[i] + factor[i] * sums[i]) - exact[i]

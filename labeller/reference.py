@@ -239,7 +239,12 @@ def heap_removal(
 
 
 def optimum(curves: Sequence[NDArray[np.float32]], budget: int) -> float:
-    """Smallest sum of errors over all k with `0 <= k <= n` and `sum k <= F`, by dynamic programming."""
+    """Smallest sum of errors over all k with `0 <= k <= n` and `sum k <= F`, by dynamic programming.
+
+    Args:
+        curves: Error curve of each pixel, float32 [n + 1], for k = 0..n.
+        budget: F, fragments.
+    """
     best = np.full(budget + 1, math.inf)
     best[0] = 0.0
     for error in curves:

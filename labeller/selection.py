@@ -114,7 +114,11 @@ class Histogram:
 
 
 def ascending_keys(values: NDArray[np.float32]) -> NDArray[np.uint32]:
-    """uint32 keys in the order of the float32 values (no NaN). The values' memory becomes that of the keys."""
+    """uint32 keys in the order of the float32 values (no NaN). The values' memory becomes that of the keys.
+
+    Args:
+        values: float32 [N], without NaN; overwritten.
+    """
     keys = values.view(np.uint32)
     _to_keys(keys)
     return keys

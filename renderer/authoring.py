@@ -163,5 +163,10 @@ def write_mesh(stage: Usd.Stage, path: Sdf.Path, geometry: Geometry) -> UsdGeom.
 
 
 def vectors(values: NDArray[Any], kind: Any) -> Any:
-    """Rows of numbers as an array of USD's vectors of floats."""
+    """Rows of numbers as an array of USD's vectors of floats.
+
+    Args:
+        values: [rows, width], the numbers; stored as float32.
+        kind: Array type of USD, such as `Vt.Vec3fArray`, whose vectors have that width.
+    """
     return kind.FromNumpy(np.ascontiguousarray(values, dtype=np.float32))

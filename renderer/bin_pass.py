@@ -76,7 +76,12 @@ class Binned:
         return np.frombuffer(self.words.read(), dtype=np.uint32).reshape(self.pixels, -1)
 
     def write_cores(self, cut: NDArray[np.uint32], begin: NDArray[np.uint32]) -> None:
-        """Give every pixel its core: uint32 [P] each, bins in it and where its run of the pool begins."""
+        """Give every pixel its core: uint32 [P] each, bins in it and where its run of the pool begins.
+
+        Args:
+            cut: uint32 [P], bins in each pixel's core.
+            begin: uint32 [P], first slot of each pixel's run of the pool.
+        """
         words, first = self.read().copy(), self.tail.bins // 2
         words[:, first], words[:, first + 1] = begin, cut << np.uint32(CURSOR_BITS) | begin
         self.words.write(words)

@@ -88,6 +88,11 @@ def describe(ctx: moderngl.Context) -> str:
     return f"{ctx.info['GL_RENDERER']}, OpenGL {ctx.info['GL_VERSION']}"
 
 
+def is_software(description: str) -> bool:
+    """Whether what `describe` says is a driver that renders on the processors."""
+    return any(name in description.lower() for name in ("llvmpipe", "softpipe", "swrast", "swiftshader", "lavapipe"))
+
+
 def main() -> int:
     """Print the driver, or why there is none."""
     try:

@@ -18,7 +18,11 @@ _PARTS = 4
 
 
 def offsets_of(counts: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Exclusive prefix sum: int64 [P+1] of counts [P]."""
+    """Exclusive prefix sum: int64 [P+1] of counts [P].
+
+    Args:
+        counts: Integers [P], entries of each row.
+    """
     offsets = np.zeros(len(counts) + 1, dtype=np.int64)
     np.cumsum(counts, out=offsets[1:])
     return offsets

@@ -22,6 +22,7 @@ def write_exr(
     linear: NDArray[np.floating],
     attributes: Mapping[str, Attribute] | None = None,
     full: bool = False,
+    planes: Mapping[str, NDArray[np.float32]] | None = None,
 ) -> None:
     """Write a picture, ZIP-compressed.
 
@@ -30,6 +31,7 @@ def write_exr(
         linear: [H, W, 3] linear RGB, row 0 at the top.
         attributes: Further attributes of the header.
         full: 32-bit channels; else half floats, whose steps are below an 8-bit one of sRGB.
+        planes: Further channels by name, float32 [H, W]: 32-bit whatever the colours are.
 
     Raises:
         OSError: The file is not complete.
@@ -42,7 +44,7 @@ def write_exr(
     }
     pixels = np.ascontiguousarray(linear, dtype=np.float32 if full else np.float16)
     try:
-        with OpenEXR.File(header, {"RGB": pixels}) as file:
+        with OpenEXR.File(header, {"RGB": pixels, **(planes or {})}) as file:
             file.write(str(path))
     except RuntimeError as error:
         raise OSError(errno.EIO, str(error), str(path)) from error

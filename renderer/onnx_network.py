@@ -36,7 +36,11 @@ class OnnxNetwork:
         self._output, self._columns = answers.name, int(answers.shape[1])
 
     def run(self, features: NDArray[np.float32]) -> NDArray[np.float32]:
-        """float32 [M, outputs], what the network answers to every row of float32 [M, features]."""
+        """float32 [M, outputs], what the network answers to every row of float32 [M, features].
+
+        Args:
+            features: float32 [M, F], one row per pixel, not normalised, in the order of the bundle's features.
+        """
         answers = np.empty((len(features), self._columns), dtype=np.float32)
         for first in range(0, len(features), ROWS):
             part = slice(first, first + ROWS)

@@ -1,18 +1,20 @@
 """Times of a frame in more detail than `Clock` has it: readbacks apart, and the GPU's own timers where they are right.
 
-A `Recording` listens to every `Clock` of the process while it is open. Nothing is measured twice: a pass's time on the
-host clock is what `Clock` found, less the readbacks within it.
+A `Recording` listens to every `Clock` of the process while it is open, by the host's clock or another one: a pass takes
+what that clock says, less the readbacks within it.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 
 import moderngl
+
+from renderer.context import describe, is_software
 
 READBACK = "readback"
 """Name of the pass that holds the time of all readbacks."""
@@ -39,29 +41,32 @@ class Recording:
     """What one or more frames took.
 
     Attributes:
-        host: Pass -> milliseconds, finished host clock, without readbacks; they are the pass `READBACK`.
+        seconds: The clock.
+        passes: Pass -> milliseconds from when all before it is finished to when it is, without readbacks; they are the
+            pass `READBACK`.
         gpu: Pass -> milliseconds by timer queries; empty where they are not right.
     """
 
-    host: dict[str, float] = field(default_factory=dict)
+    seconds: Callable[[], float] = time.perf_counter
+    passes: dict[str, float] = field(default_factory=dict)
     gpu: dict[str, float] = field(default_factory=dict)
     _query: moderngl.Query | None = None
     _open: list[str] = field(default_factory=list)
 
     @property
     def milliseconds(self) -> float:
-        """Of all passes on the host clock, readbacks included."""
-        return sum(self.host.values())
+        """Of all passes, readbacks included."""
+        return sum(self.passes.values())
 
 
 _recording: Recording | None = None
 
 
 @contextmanager
-def recording(ctx: moderngl.Context) -> Iterator[Recording]:
+def recording(ctx: moderngl.Context, seconds: Callable[[], float] = time.perf_counter) -> Iterator[Recording]:
     """Listen to all clocks until the context is left; one at a time."""
     global _recording
-    made = Recording(_query=ctx.query(time=True) if timers_are_right(ctx) else None)
+    made = Recording(seconds, _query=ctx.query(time=True) if timers_are_right(ctx) else None)
     _recording, before = made, _recording
     try:
         yield made
@@ -89,10 +94,24 @@ def gpu_pass(name: str) -> Iterator[None]:
         listening._open.pop()
 
 
-def host_pass(name: str, milliseconds: float) -> None:
-    """A pass is over that took so long on the host clock, readbacks within it included."""
+def shared_clock(ctx: moderngl.Context) -> Callable[[], float]:
+    """The clock that tells techniques apart on a machine that others use, too.
+
+    A software driver's work is that of its threads: what the processors do for this process does not depend on who else
+    keeps them busy. A GPU's is on the host's clock.
+    """
+    return time.process_time if is_software(describe(ctx)) else time.perf_counter
+
+
+def now() -> float:
+    """Seconds by the clock of who listens; 0 where nobody does."""
+    return 0.0 if _recording is None else _recording.seconds()
+
+
+def pass_over(name: str, milliseconds: float) -> None:
+    """A pass is over that took so long by `now`, readbacks within it included."""
     if _recording is not None:
-        _recording.host[name] = _recording.host.get(name, 0.0) + milliseconds
+        _recording.passes[name] = _recording.passes.get(name, 0.0) + milliseconds
 
 
 @contextmanager
@@ -103,13 +122,13 @@ def readback(ctx: moderngl.Context) -> Iterator[None]:
         yield
         return
     ctx.finish()
-    start = time.perf_counter()
+    start = listening.seconds()
     yield
-    taken = 1e3 * (time.perf_counter() - start)
-    listening.host[READBACK] = listening.host.get(READBACK, 0.0) + taken
+    taken = 1e3 * (listening.seconds() - start)
+    listening.passes[READBACK] = listening.passes.get(READBACK, 0.0) + taken
     if listening._open:
         within = listening._open[-1]
-        listening.host[within] = listening.host.get(within, 0.0) - taken
+        listening.passes[within] = listening.passes.get(within, 0.0) - taken
 
 
 @cache

@@ -69,7 +69,7 @@ class BenchCell(CellKey):
         budget: F, fragments.
         exact: Whether the budget holds every fragment; then there is no score.
         repeats: Timed frames, after a warm-up.
-        passes: Milliseconds of each pass on the finished host clock, readbacks in one of their own.
+        passes: Milliseconds of each pass by the view's clock, readbacks in one of their own.
         gpu: Medians of each pass by GPU timer queries, milliseconds; empty where the driver's are not right.
         frame: Sum of the passes.
         mse: Paper's convention: as displayed, clamped 8-bit sRGB, whole image.

@@ -175,10 +175,10 @@ class SelfTest(BaseModel):
     """Rows with which anyone can check what their compiler made of a form.
 
     Attributes:
-        features: [R][F], real inputs of the network.
-        outputs: [R][outputs], the answers, from float64.
-        sums: [S][4 * texels], raw sums of pixels (`renderer.features.SUMS`).
-        derived: [S][F], their features, from the same expressions.
+        features: [R, F], real inputs of the network.
+        outputs: [R, outputs], the answers, from float64.
+        sums: [S, 4 * texels], raw sums of pixels (`renderer.features.SUMS`).
+        derived: [S, F], their features, from the same expressions.
         tolerance: File -> largest difference of an output, relative to `output_scale`.
         feature_tolerance: Largest difference of a feature, relative to max(1, |value|).
         output_scale: [outputs], the largest |value| of each on the inputs that parity was measured on, at least 1.

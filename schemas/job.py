@@ -98,17 +98,18 @@ class JobSpec(Options):
     start_from: Annotated[
         ModelReference,
         Option(
-            "Network to begin with: scratch, champion (the name's own), or NAME@ALIAS.",
+            "Network to start from: scratch, champion (the name's own), or NAME@ALIAS.",
             flags=("--from", "--start-from"),
         ),
     ] = SCRATCH
     replay: Annotated[
-        bool, Option("Train again on what the network that is begun with was trained on, so that it is not forgotten.")
+        bool,
+        Option("Train again on the data of the network that training starts from, so as not to forget them."),
     ] = True
     promote: Annotated[Literal["if-better", "never"], Option("Whether a better version becomes the champion.")] = (
         "if-better"
     )
-    priority: Annotated[Priority, Option("Class of the job's tasks in the queues.")] = "normal"
+    priority: Annotated[Priority, Option("Priority of the job's tasks in the queues.")] = "normal"
 
     @property
     def options(self) -> Options:

@@ -32,7 +32,7 @@ class Options(BaseModel):
         tuple[Annotated[float, Field(gt=0.0, le=LIMITS.budget)], ...] | None,
         Field(min_length=1, max_length=LIMITS.budgets),
         Option(
-            "Fragments of a frame, as multiples of width x height.",
+            "Fragments per frame, as multiples of width x height.",
             absent="by the captured views, up to three quarters of what they hold, from 0.05 to 4",
             example=".5,1,2",
         ),
@@ -40,9 +40,7 @@ class Options(BaseModel):
     alpha: Annotated[
         float | None,
         Field(gt=0.0, lt=1.0),
-        Option(
-            "Opacity that every surface gets, so that opaque scenes can be used as well.", absent="the materials' own"
-        ),
+        Option("Opacity of every surface, so that opaque scenes can be used as well.", absent="the materials' own"),
     ] = None
     glass: Annotated[GlassReading, Option(GLASS_HELP)] = DEFAULT_GLASS
     views_per_scene: Annotated[
@@ -57,18 +55,16 @@ class Options(BaseModel):
     tail: Annotated[
         TailName,
         Option(
-            "How fragments beyond k are averaged; labels and bundles need depth bins, as the first "
+            "Approximation of the fragments beyond k; labels and bundles need depth bins, as the first "
             f"{len(BINNED_TAILS)} have."
         ),
     ] = DEFAULT_TAIL
-    g: Annotated[float, Field(ge=0.0, le=10.0), Option("Steepness of the density tail, which no bundle has.")] = (
+    g: Annotated[float, Field(ge=0.0, le=10.0), Option("Steepness of the density tail, which no bundle uses.")] = (
         DENSITY_G
     )
-    network: Annotated[NetworkSize, Option("Size of the network; one that the training begins with keeps its own.")] = (
-        DEFAULT_NETWORK
-    )
+    network: Annotated[NetworkSize, Option("Size of the network; a pretrained one keeps its own.")] = DEFAULT_NETWORK
     seed: Annotated[
-        int, Field(ge=0, le=2**53 - 1), Option("Seed of everything drawn at random: views, pixels, weights, batches.")
+        int, Field(ge=0, le=2**53 - 1), Option("Seed of everything random: views, pixels, weights, batches.")
     ] = 0
     steps: Annotated[int | None, Field(ge=1, le=LIMITS.steps), Option("Optimiser steps.", absent="the trainer's")] = (
         None
@@ -77,13 +73,13 @@ class Options(BaseModel):
         int,
         Field(ge=0, le=LIMITS.steps),
         Option(
-            "Stop after so many validations without a better score on a fifth of the training scenes, which is kept "
-            "out for that; 0: never."
+            "Stop after this many validations without a better score on a fifth of the training scenes, kept out for "
+            "that; 0: never."
         ),
     ] = 0
     weights: Annotated[
         PixelWeights,
-        Option("What a pixel's errors count in training: none: all alike; flip: weighted by FLIP.", example="flip"),
+        Option("Weight of a pixel's errors in training; none: all alike; flip: by FLIP.", example="flip"),
     ] = DEFAULT_WEIGHTS
 
     @field_validator("budgets", mode="after")
@@ -96,7 +92,7 @@ class Options(BaseModel):
         if self.pixels > LIMITS.pixels:
             raise ValueError(f"{self.width} x {self.height} is more than {LIMITS.pixels} pixels")
         if self.budgets is not None and self.budgets[0] * self.pixels < 1.0:
-            raise ValueError("a budget is less than one fragment")
+            raise ValueError("a budget is below one fragment")
         return self
 
     @property

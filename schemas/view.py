@@ -79,7 +79,11 @@ class View(BaseModel):
         return matrix
 
     def clip_range(self, bounds: NDArray[np.float64]) -> tuple[float, float]:
-        """Near and far distance, metres, tight around `bounds` (float64 [2, 3]) within the view's own range."""
+        """Near and far distance, metres, tight around `bounds` (float64 [2, 3]) within the view's own range.
+
+        Args:
+            bounds: float64 [2, 3], least and greatest corner of the scene in world space, metres.
+        """
         corners = np.array([[bounds[i, 0], bounds[j, 1], bounds[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
         depth = -(corners @ self.world_to_view()[2, :3] + self.world_to_view()[2, 3])
         diagonal = float(np.linalg.norm(bounds[1] - bounds[0])) or 1.0

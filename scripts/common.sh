@@ -4,6 +4,17 @@
 say() { printf 'setup: %s\n' "$*" >&2; }
 die() { say "$*"; exit 1; }
 
+find_python() {
+    local candidate
+    for candidate in ${PYTHON:-python3.11 python3.12 python3.13 python3}; do
+        if "$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+            command -v "$candidate"
+            return
+        fi
+    done
+    die "Python 3.11 or later is needed: install it, or name it with PYTHON=/path/to/python."
+}
+
 apt_install() { # why, packages...
     local why=$1 waiting=(); shift
     command -v apt-get >/dev/null || die "$why, and there is no apt-get here: install the equivalent of '$*' and run this again."

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Writes requirements.lock: exact versions and sha256 hashes of everything, for every platform, free of index addresses;
-# and, with the same versions, one lock for each image and one for what builds the wheel (deploy/containers).
+# and, with the same versions, one lock for each image and one for what builds the wheel (deploy/containers). The site of
+# the documents has its own (docs/requirements.lock): nothing else is installed with it.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=deploy/containers/role.sh
@@ -25,4 +26,5 @@ while read -r role _; do
     compile "deploy/containers/requirements-$role.lock" pyproject.toml --constraints requirements.lock \
         $(printf -- '--extra=%s ' $extras)
 done < <(grep -v '^#' deploy/containers/roles)
+compile docs/requirements.lock --group pyproject.toml:docs
 compile deploy/containers/requirements-build.lock --constraints requirements.lock - <<<"setuptools>=77"

@@ -8,17 +8,6 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 # shellcheck source=scripts/common.sh
 . scripts/common.sh
 
-find_python() {
-    local candidate
-    for candidate in ${PYTHON:-python3.11 python3.12 python3.13 python3}; do
-        if "$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
-            command -v "$candidate"
-            return
-        fi
-    done
-    die "Python 3.11 or later is needed: install it, or name it with PYTHON=/path/to/python."
-}
-
 make_venv() {
     local python version
     # It is emptied first, and through a link that would be another checkout's.

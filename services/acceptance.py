@@ -58,7 +58,7 @@ def accept(
     pinned = spec.model_copy(update={"start_from": meant})
     begun = begun_plan(pinned, plan_of_job(pinned, scenes), registry, measured, store)
     units = "-".join(str(count) for count in registry.manifest(publication).hidden)
-    notes = [f"The training begins with {meant}, and the network keeps its size, {units} units."]
+    notes = [f"The training starts from {meant}, and the network keeps its size, {units} units."]
     if begun.forgotten:
         names = ", ".join(begun.forgotten)
         notes.append(f"No labels of {names} are known, which {meant} was trained on: it may forget them.")

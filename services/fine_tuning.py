@@ -66,8 +66,8 @@ def refuse_known(scenes: Iterable[PlannedScene], known: Collection[str]) -> None
     for scene in scenes:
         if scene.held_out and scene.source.digest in known:
             raise Problem(
-                f"The scene {scene.label} is held out, but the network that is begun with was trained on it.",
-                "Hold out another one (--holdout), or begin with another network (--from): a test on what was "
+                f"The scene {scene.label} is held out, but the pretrained network was trained on it.",
+                "Hold out another one (--holdout), or start from another network (--from): a test on what was "
                 "trained on proves nothing.",
                 ExitCode.CHECK_FAILED,
             )

@@ -237,7 +237,7 @@ def _fault(
     flag = by_field.get(str(where[0])) if where else None
     if flag is None:
         place = ".".join(map(str, where))
-        return f"{place}: {said}." if place else f"{said[0].upper()}{said[1:]}.", "Change those options."
+        return f"{place}: {said}." if place else f"{said[0].upper()}{said[1:]}.", "Correct these options."
     info, name = model.model_fields[str(where[0])], flag.names[0]
     if detail["type"] == "literal_error":
         there_is = "There are no" if flag.fields[0].endswith("s") else "There is no"
@@ -245,8 +245,8 @@ def _fault(
         return f"{there_is} {flag.fields[0]} '{detail['input']}'.", f"Use one of {choices}: {flag.example}."
     shown = _text([fields.get(each, model.model_fields[each].default) for each in flag.fields])
     if detail["type"] in _OUT_OF_RANGE:
-        return f"{name} {shown} is not {_said_range(info)}.", "Change that option."
-    return f"{name} {shown}: {said}.", "Change that option."
+        return f"{name} {shown} is not {_said_range(info)}.", f"Give {_range(info)}: {flag.example}."
+    return f"{name} {shown}: {said}.", f"Write it like {flag.example}."
 
 
 _OUT_OF_RANGE = ("greater_than", "greater_than_equal", "less_than", "less_than_equal", "finite_number")

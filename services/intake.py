@@ -19,6 +19,7 @@ from renderer.scene import LoadOptions, load_scene
 from renderer.usd.stage import OutsideHome, WarningLog, open_stage, stage_time, usd_diagnostics, used_layers
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
+from services.wording import counted
 
 WARNINGS = 50
 """Most warnings that are kept."""
@@ -182,5 +183,5 @@ def _warnings(lines: tuple[str, ...], home: Path, checked: CheckedUpload) -> lis
     if len(own) < len(lines):
         found.append("USD found composition errors; usdchecker lists them")
     if checked.missing:
-        found.append(f"{checked.missing} files that are named are not in the upload")
+        found.append(f"not in the upload: {counted(checked.missing, 'files')} that the scene names")
     return found

@@ -83,11 +83,11 @@ class Keys:
         """
         unknown = sorted(set(scopes) - set(SCOPES))
         if unknown or not scopes:
-            wrong = f"There is no scope '{unknown[0]}'." if unknown else "A key without a scope is of no use."
+            wrong = f"There is no scope '{unknown[0]}'." if unknown else "A key needs at least one scope."
             raise Problem(wrong, f"Choose among {', '.join(SCOPES)}.")
         now = time.time()
         if expires is not None and expires <= now:
-            raise Problem("The key would be expired from the start.", "Choose a time that is to come.")
+            raise Problem("The key would be expired from the start.", "Choose a time in the future.")
         identifier = secrets.token_hex(6)
         secret = f"dia_{identifier}_{secrets.token_urlsafe(32)}"
         row = {

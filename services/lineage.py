@@ -117,6 +117,6 @@ def _made_from(store: Store, artifact: str, called: str) -> Address:
     except MissingArtifact as missing:
         raise Problem(
             f"{called} cannot be replayed: {artifact} is gone.",
-            "Begin with another version, or leave out the replay (--no-replay).",
+            "Start from another version, or leave out the replay (--no-replay).",
             ExitCode.CONFLICT,
         ) from missing

@@ -147,7 +147,7 @@ class LocalScene:
         if listed is None:
             return (self._camera(camera),)
         if camera is not None:
-            raise Problem("Both --camera and --views say where to look from.", "Leave one of them out.")
+            raise Problem("Both --camera and --views set the camera.", "Leave one of them out.")
         views = placed_views(listed_views(listed, self.file), self.now.scene)
         if not views:
             raise Problem(

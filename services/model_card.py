@@ -16,6 +16,7 @@ from schemas.measurement import Measurement
 from services import summary
 from services.flags import written
 from services.plan import Plan
+from services.wording import counted
 
 _WORST_SCENES = 5
 _WORST_CELLS = 8
@@ -104,7 +105,8 @@ def _measured(measurements: Sequence[Measurement], manifest: Manifest) -> str:
     return "\n\n".join(
         (
             "## What it was measured on",
-            f"{len(views)} views of {len(scenes)} scenes that it was not trained on: {_escaped(', '.join(held))}. "
+            f"{counted(len(views), 'views')} of {counted(len(scenes), 'scenes')} that it was not "
+            f"trained on: {_escaped(', '.join(held))}. "
             f"Pictures of {_sizes(bounded)} are compared with the exact one as displayed. VKB (`{summary.BASELINE}`) "
             "and the certified optimal allocation have the same tail and budget. Views whose fragments all fit a "
             "budget are not counted; errors and ratios are geometric means.",

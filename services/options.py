@@ -69,7 +69,9 @@ class BuildOptions:
         _check_scenes(self.scenes)
         check_bundle(self.start, "--from")
         if self.replay is not None and self.start is None:
-            raise Problem("--replay needs --from: there is nothing to forget without it.", "Change that option.")
+            raise Problem(
+                "--replay needs --from: only a fine-tuning replays data.", "Add --from, or leave out --replay."
+            )
         object.__setattr__(self, "holdout", _resolve_holdout(self.holdout, self.scenes))
         if self.views is not None and not self.views.is_file():
             raise Problem(
@@ -193,7 +195,7 @@ def check_bundle_tail(tail: TailName) -> None:
     """
     if tail not in BINNED_TAILS:
         raise Problem(
-            f"A bundle cannot be made for the tail {tail}: it has no depth bins, which its cores are made of.",
+            f"A bundle cannot be made for the tail {tail}: it has no depth bins, and cores are made of depth bins.",
             f"Use one of {', '.join(BINNED_TAILS)}: --tail {DEFAULT_TAIL}.",
         )
 
@@ -218,17 +220,34 @@ def check_trained_tail(tail: TailName | None, trained: TailSpec | None) -> None:
 
 
 def check_bundle(reference: str | None, option: str) -> None:
-    """Refuse an empty name of a bundle: as a path it would be the folder that the command runs in.
+    """Refuse an empty name of a bundle, which as a path is the working folder, and a path where no folder is.
 
     Args:
         reference: A folder, or NAME@ALIAS; None: not given.
         option: Where it was given.
 
     Raises:
-        Problem: It is empty.
+        Problem: It is neither.
     """
-    if reference is not None and not reference.strip():
+    if reference is None:
+        return
+    if not reference.strip():
         raise Problem(f"{option} is empty.", f"Name a folder, or a bundle of the registry: {option} glass@champion.")
+    path = Path(reference)
+    if len(path.parts) > 1 or path.exists() or reference.startswith((".", "~")):
+        _check_folder(path, option)
+
+
+def _check_folder(path: Path, option: str) -> None:
+    if path.is_dir():
+        return
+    if path.exists():
+        raise Problem(f"{option} {path} is a file, not the folder of a bundle.", "Name the folder that it is in.")
+    raise Problem(
+        f"{option}: there is no folder {path}.",
+        f"Check the path, or name a bundle of the registry: {option} glass@champion.",
+        ExitCode.NOT_FOUND,
+    )
 
 
 def parse_licences(texts: Sequence[str], scenes: Sequence[str]) -> dict[str, str]:
@@ -322,7 +341,7 @@ def _check_budgets(budgets: Sequence[float], size: tuple[int, int] | None) -> No
     if not budgets:
         raise Problem("No budget was given.", "Give at least one, --budgets .5,1,2, or leave out --budgets.")
     if len(budgets) > LIMITS.budgets:
-        raise Problem(f"{len(budgets)} budgets are not possible.", f"Give 1 to {LIMITS.budgets}.")
+        raise Problem(f"{len(budgets)} budgets are too few or too many.", f"Give 1 to {LIMITS.budgets}.")
     for budget in budgets:
         check_budget(budget, "--budgets .5,1,2", size)
 

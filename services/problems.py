@@ -68,10 +68,10 @@ _TYPES = (
     ),
     ProblemType(
         slug="not-found",
-        title="There is nothing of this name.",
+        title="There is nothing with this name.",
         status=404,
         explanation="The address, or the thing that it names, does not exist, or was removed because of its age.",
-        remedy="List what there is, and check the spelling.",
+        remedy="List the existing ones, and check the spelling.",
     ),
     ProblemType(
         slug="method-not-allowed",
@@ -84,16 +84,16 @@ _TYPES = (
         slug="too-slow",
         title="The request did not arrive in time.",
         status=408,
-        explanation="The head of a request has to be there within seconds; a body may not stop, and arrives at a least "
-        "rate on average. Who waits holds places that others need.",
+        explanation="The head of a request must arrive within seconds; a body must not stall, and must keep a minimum "
+        "rate on average. A slow request occupies a place that others need.",
         remedy="Send smaller parts, or over a faster connection.",
     ),
     ProblemType(
         slug="conflict",
-        title="The request conflicts with the present state.",
+        title="The request conflicts with the current state.",
         status=409,
         explanation="What was asked for does not fit the state that the resource is in.",
-        remedy="Look at the present state, then decide.",
+        remedy="Check the current state, then decide.",
     ),
     ProblemType(
         slug="wrong-offset",
@@ -101,7 +101,7 @@ _TYPES = (
         status=409,
         explanation="Parts of an upload are appended; another request has appended this one already, or it is too "
         "early. The member `received` says how many bytes there are.",
-        remedy="Go on from `received`.",
+        remedy="Continue from `received`.",
     ),
     ProblemType(
         slug="blobs-missing",
@@ -113,14 +113,14 @@ _TYPES = (
     ),
     ProblemType(
         slug="scene-not-accepted",
-        title="A job takes accepted scenes only.",
+        title="A job takes only accepted scenes.",
         status=409,
         explanation="A scene of the job is still being checked, or was rejected.",
         remedy="Wait until the scene is accepted; of a rejected scene, its record says what is wrong with it.",
     ),
     ProblemType(
         slug="too-large",
-        title="The request is beyond a limit.",
+        title="The request exceeds a limit.",
         status=413,
         explanation="A body, a file, or the number or size of what a request asks for is limited, before anything is "
         "queued.",
@@ -128,7 +128,7 @@ _TYPES = (
     ),
     ProblemType(
         slug="unsupported-media-type",
-        title="The body is of a type that is not understood.",
+        title="The type of the body is not supported.",
         status=415,
         explanation="Bodies are `application/json`; parts of uploads are `application/octet-stream`.",
         remedy="Set the header `Content-Type`.",
@@ -138,7 +138,7 @@ _TYPES = (
         title="The range lies outside the file.",
         status=416,
         explanation="The header `Content-Range` of the answer tells the size.",
-        remedy="Ask for a range within the file.",
+        remedy="Request a range within the file.",
     ),
     ProblemType(
         slug="misdirected",
@@ -150,7 +150,7 @@ _TYPES = (
     ),
     ProblemType(
         slug="invalid",
-        title="The request does not have the form that is expected.",
+        title="The request does not have the expected form.",
         status=422,
         explanation="`errors` lists the places and what is wrong there.",
         remedy="Correct the places that are listed.",
@@ -172,7 +172,7 @@ _TYPES = (
     ),
     ProblemType(
         slug="headers-too-large",
-        title="The headers of the request are beyond a limit.",
+        title="The headers of the request exceed a limit.",
         status=431,
         explanation="Bytes and number of headers, of trailers and of the address are limited before anybody looks at "
         "them.",
@@ -180,10 +180,10 @@ _TYPES = (
     ),
     ProblemType(
         slug="internal",
-        title="Something went wrong that should not.",
+        title="An internal error occurred.",
         status=500,
         explanation="An error of the service; its log has the details under the request id.",
-        remedy="Try again; if it stays, report the request id.",
+        remedy="Try again; if it persists, report the request id.",
     ),
     ProblemType(
         slug="unavailable",
@@ -194,7 +194,7 @@ _TYPES = (
     ),
     ProblemType(
         slug="storage-full",
-        title="The service has no room left.",
+        title="The service has run out of space.",
         status=507,
         explanation="The disk or the quota of the store or of the database is full. Nothing of the request was kept "
         "that it did not name as received; what is there already can still be read.",
@@ -214,7 +214,7 @@ _SCENE_TITLES: Mapping[Slug, tuple[str, str]] = {
         "What a variable expression names is only known when the stage is composed.",
     ),
     "scene-symlink": (
-        "The scene has something that is no plain file.",
+        "The scene contains something that is not a plain file.",
         "A symbolic link, a pipe, a device or a socket.",
     ),
     "scene-file-name": ("A file of the scene has a name that is not accepted.", "It has signs with a special meaning."),

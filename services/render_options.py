@@ -12,6 +12,8 @@ from typing import get_args
 import numpy as np
 
 from renderer.allocation.importance import VkbOptions
+from renderer.antialias import SAMPLES
+from renderer.aovs import CHANNELS, AovName
 from renderer.scene import LoadOptions
 from renderer.techniques import TECHNIQUES, Needs
 from renderer.techniques.kbuffer_deep import Inference
@@ -52,6 +54,8 @@ class RenderOptions:
         frames: Time codes; empty: the start of the stage. Not a number: the default time.
         load: How scenes are read; the time is that of the frame.
         background: Linear RGB where nothing opaque is.
+        samples: Frames that the mean of is a picture, one for each sample of a pixel.
+        aovs: Planes beside the picture, in EXR files.
         output: Path with a suffix of SUFFIXES, and # where a frame's number goes; None: named after the scene.
         is_full: Whether EXR channels are 32-bit instead of half floats.
         compare: Whether each picture is compared with the exact one.
@@ -75,6 +79,8 @@ class RenderOptions:
     frames: tuple[float, ...] = ()
     load: LoadOptions = field(default_factory=LoadOptions)
     background: RGB = (1.0, 1.0, 1.0)
+    samples: int = 1
+    aovs: tuple[AovName, ...] = ()
     output: Path | None = None
     is_full: bool = False
     compare: bool = False
@@ -83,13 +89,22 @@ class RenderOptions:
     def __post_init__(self) -> None:
         for side in (self.image_width, *(self.size or ())):
             if not 1 <= side <= LIMITS.max_side:
-                raise Problem(f"{side} pixels are no side of a picture.", f"Give 1 to {LIMITS.max_side} pixels.")
+                raise Problem(
+                    f"Invalid size: {side} pixels.", f"Give width and height of 1 to {LIMITS.max_side} pixels."
+                )
+        if self.samples not in SAMPLES:
+            raise Problem(
+                f"A pixel cannot have {self.samples} samples.",
+                f"Use one of {', '.join(map(str, SAMPLES))}: --samples 4.",
+            )
+        if self.aovs and (self.output is None or self.output.suffix.lower() != ".exr"):
+            raise Problem("A PNG picture has no layers, which --aov asks for.", "Name an EXR picture: -o picture.exr.")
         check_budget(self.budget, "--budget 2", self.size)
         check_bundle(self.bundle, "--bundle")
         check_steepness(self.g, has_bundle=self.bundle is not None, is_tail_named=self.tail is not None)
         if self.output is not None:
             if self.output.suffix.lower() not in SUFFIXES:
-                raise Problem(f"{self.output} is no name of a picture.", "End it in .png or .exr.")
+                raise Problem(f"{self.output} is not the name of a picture.", "End it in .png or .exr.")
             check_pattern(self.output, self.frames)
 
 
@@ -145,7 +160,7 @@ def parse_times(frames: str | None, default_time: bool) -> tuple[float, ...]:
         Problem: Both are given, or the frames are none.
     """
     if frames is not None and default_time:
-        raise Problem("Both --frames and --defaultTime say when.", "Leave one of them out.")
+        raise Problem("Both --frames and --defaultTime set the time.", "Leave one of them out.")
     if default_time:
         return (math.nan,)
     return () if frames is None else parse_frames(frames)
@@ -180,7 +195,7 @@ def parse_refine(complexity: str | None, refine: int | None) -> int:
         Problem: Both are given, or there is no such word.
     """
     if complexity is not None and refine is not None:
-        raise Problem("Both --complexity and --refine say how far to refine.", "Leave one of them out.")
+        raise Problem("Both --complexity and --refine set the refinement.", "Leave one of them out.")
     if complexity is not None and complexity not in COMPLEXITIES:
         raise Problem(f"There is no complexity '{complexity}'.", f"Use one of {', '.join(COMPLEXITIES)}.")
     return COMPLEXITIES[complexity] if complexity is not None else refine or 0
@@ -200,7 +215,9 @@ def parse_background(text: str) -> RGB:
     except ValueError:
         red = green = blue = math.nan
     if not all(0.0 <= value <= 1.0 for value in (red, green, blue)):
-        raise Problem(f"'{text}' is no colour.", "Write it like '#ffffff', or as linear red,green,blue: 0.5,0.5,0.5.")
+        raise Problem(
+            f"'{text}' is not a colour.", "Write it like '#ffffff', or as linear red,green,blue: 0.5,0.5,0.5."
+        )
     return red, green, blue
 
 
@@ -219,12 +236,27 @@ def parse_vkb(text: str) -> VkbOptions:
     for word in words:
         factor = word.removeprefix("no-")
         if word != "thesis" and (factor == word or factor not in _FACTORS):
-            raise Problem(f"--vkb '{word}' is no switch.", f"Use thesis, {', '.join(f'no-{f}' for f in _FACTORS)}.")
+            raise Problem(f"--vkb '{word}' is not a switch.", f"Use thesis, {', '.join(f'no-{f}' for f in _FACTORS)}.")
         if factor == "noise":
             options = replace(options, noise=0.0)
         elif word != "thesis":
             options = replace(options, **{factor: False})
     return options
+
+
+def parse_aovs(names: Sequence[str]) -> tuple[AovName, ...]:
+    """Names of planes, also with commas between.
+
+    Raises:
+        Problem: There is no such plane.
+    """
+    found: list[AovName] = []
+    for name in _listed(names):
+        known = next((each for each in CHANNELS if each == name), None)
+        if known is None:
+            raise Problem(f"There is no plane '{name}'.", f"Use some of {', '.join(CHANNELS)}: --aov depth,alpha.")
+        found.append(known)
+    return tuple(dict.fromkeys(found))
 
 
 def parse_needs(vkb: str, inference: str, nodes: int | None, samples: int | None) -> Needs:

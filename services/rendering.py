@@ -13,27 +13,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer import metrics
+from renderer.aovs import CHANNELS
 from renderer.exact_bytes import exact_bytes, fits
 from renderer.exr import camera_attributes, write_exr
 from renderer.exr_header import Attribute
 from renderer.frame import Frame
-from renderer.hidden import hidden_fragments
 from renderer.scene import NothingToDraw
-from renderer.techniques import TECHNIQUES, Budget, KBufferDeep, Rendered, SBuffer, Technique, technique
-from renderer.techniques.skips import HIDDEN_FRAGMENTS
+from renderer.techniques import (
+    TECHNIQUES,
+    Budget,
+    KBufferDeep,
+    KBufferTemporal,
+    Needs,
+    SBuffer,
+    Technique,
+    technique,
+)
 from renderer.timecodes import numbered
 from schemas.colour import display8
 from schemas.problem import ExitCode, Problem
+from services.contact_sheet import ContactSheet
 from services.local_scenes import Chosen, LocalScene, as_usd
 from services.options import ChosenTail, check_budget, check_trained_tail, chosen_tail
 from services.progress import Progress
 from services.render_options import RenderOptions
 from services.scene_warnings import said_warnings
+from services.shots import Shot, Subject, shoot
 from services.stages.pictures import write_png
+from services.summary import full_title
 from services.writing import replacing
 
-_WARM_SIZE = (64, 48)
-"""Drivers compile shaders at their first use: what is timed is not the first."""
+SHEET = "sheet"
+"""What the name of a contact sheet has in the place of a technique."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +61,7 @@ class Picture:
         family: `exact`, `bounded` or `approximate`.
         width: Pixels per row.
         height: Rows.
+        samples: Of a pixel. Fragments, the budget, milliseconds and skips are sums over them; bytes are of one frame.
         budget: F, fragments.
         tail: Of the bounded techniques.
         fragments: N.
@@ -66,6 +78,7 @@ class Picture:
         flip: Mean LDR-FLIP.
         problem: Why there is no picture.
         warnings: What of the scene is not supported or missing.
+        sheet: Contact sheet that it is on, written behind the last picture of its view; None: on none.
     """
 
     file: Path
@@ -77,6 +90,7 @@ class Picture:
     family: str
     width: int
     height: int
+    samples: int
     budget: int
     tail: str
     fragments: int | None = None
@@ -93,16 +107,41 @@ class Picture:
     flip: float | None = None
     problem: str | None = None
     warnings: tuple[str, ...] = ()
+    sheet: Path | None = None
+
+    @property
+    def milliseconds(self) -> float | None:
+        """Of all passes."""
+        return None if self.passes is None else sum(self.passes.values())
 
     def json(self) -> dict[str, Any]:
         """Of plain values only."""
-        total = None if self.passes is None else sum(self.passes.values())
-        return {**asdict(self), "file": str(self.file), "scene": str(self.scene), "total_ms": total}
+        paths = {
+            "file": str(self.file),
+            "scene": str(self.scene),
+            "sheet": None if self.sheet is None else str(self.sheet),
+        }
+        return {**asdict(self), **paths, "total_ms": self.milliseconds}
+
+
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """A technique, as often as it is needed.
+
+    Attributes:
+        name: Of it.
+        samples: One for each sample of a pixel: the same, unless it remembers what it saw of its last frame.
+        warm: One whose frames are not kept, of which the same holds.
+    """
+
+    name: str
+    samples: tuple[Technique, ...]
+    warm: Technique
 
 
 @dataclass(frozen=True, slots=True)
 class _Job:
-    """One picture to make.
+    """The pictures of a view.
 
     Attributes:
         scene: Loaded at its frame.
@@ -110,6 +149,8 @@ class _Job:
         frame: Time code, or None for the default time.
         size: Width and height.
         tail: Of the bounded techniques.
+        exact: The exact picture, once something has been compared with it.
+        sheet: Contact sheet.
     """
 
     scene: LocalScene
@@ -117,6 +158,12 @@ class _Job:
     frame: float | None
     size: tuple[int, int]
     tail: ChosenTail
+    exact: list[Shot]
+    sheet: ContactSheet
+
+    def subject(self, options: RenderOptions) -> Subject:
+        """What is rendered."""
+        return Subject(self.scene.gpu(), self.chosen.view, self.size, options.background, options.samples, options.aovs)
 
 
 def render(options: RenderOptions, progress: Progress) -> Iterator[Picture]:
@@ -127,20 +174,27 @@ def render(options: RenderOptions, progress: Progress) -> Iterator[Picture]:
     """
     with bundle_folder(options.bundle, options.state) as bundle:
         needs = replace(options.needs, bundle=bundle, allocate=optimal)
-        techniques = [technique(name, needs) for name in options.techniques]
-        trained = next((each.manifest.tail for each in techniques if isinstance(each, KBufferDeep)), None)
+        ways = [_way(name, needs, options.samples) for name in options.techniques]
+        trained = next((way.warm.manifest.tail for way in ways if isinstance(way.warm, KBufferDeep)), None)
         check_trained_tail(options.tail, trained)
         tail = chosen_tail(options.tail, options.g, trained)
         written: set[Path] = set()
         for file in options.scenes:
             with as_usd(file) as usd:
                 scene = LocalScene(file, usd, options.load)
-                yield from _scene(scene, techniques, tail, options, progress, written)
+                yield from _scene(scene, ways, tail, options, progress, written)
+
+
+def _way(name: str, needs: Needs, samples: int) -> _Way:
+    first = technique(name, needs)
+    if isinstance(first, KBufferTemporal):
+        return _Way(name, tuple(technique(name, needs) for _ in range(samples)), first)
+    return _Way(name, (first,) * samples, first)
 
 
 def _scene(
     scene: LocalScene,
-    techniques: list[Technique],
+    ways: list[_Way],
     tail: ChosenTail,
     options: RenderOptions,
     progress: Progress,
@@ -151,31 +205,49 @@ def _scene(
     left_out: list[Problem] = []
     for time in options.frames or (None,):
         try:
-            warnings = scene.at(time).warnings
+            loaded = scene.at(time)
         except NothingToDraw as problem:
             left_out.append(problem)
             if len(left_out) >= len(options.frames):
                 raise
             progress.note(f"warning: frame {time:g} is left out. {problem.title}")
             continue
-        for line in said_warnings(scene.file, [line for line in warnings if line not in told], scene.file):
+        hint = [said_opaque(options)] if loaded.is_opaque else []
+        news = [line for line in (*hint, *loaded.warnings) if line not in told]
+        for line in said_warnings(scene.file, news, scene.file):
             progress.note(line)
-        told.update(warnings)
+        told.update(news)
         frame = scene.start if time is None else None if math.isnan(time) else time
         for chosen in scene.views(options.camera, options.views):
-            job = _Job(scene, chosen, frame, size_of(options, chosen.aspect), tail)
+            size = size_of(options, chosen.aspect)
+            sheet = ContactSheet(f"{scene.file.name}, view {chosen.view.name}")
+            job = _Job(scene, chosen, frame, size, tail, [], sheet)
             check_budget(options.budget, "--budget 2", job.size)
-            for each in techniques:
-                path = path_of(options, job, each.name)
-                if path in written:
-                    raise Problem(
-                        f"More than one picture would be written to {path}.", "Give the scenes different names."
-                    )
-                written.add(path)
-                yield _picture(job, each, path, options, warm)
+            yield from _view(job, ways, options, warm, written)
 
 
-def _picture(job: _Job, each: Technique, path: Path, options: RenderOptions, warm: set[str]) -> Picture:
+def said_opaque(options: RenderOptions) -> str:
+    """What to do about a scene without anything transparent."""
+    if options.load.alpha is not None:
+        return "nothing in it is transparent"
+    return "nothing in it is transparent: --alpha 0.33 makes every surface so"
+
+
+def _view(job: _Job, ways: list[_Way], options: RenderOptions, warm: set[str], written: set[Path]) -> Iterator[Picture]:
+    sheet = path_of(options, job, SHEET).with_suffix(".png") if options.compare and len(ways) > 1 else None
+    paths = {way.name: path_of(options, job, way.name) for way in ways}
+    for path in (*paths.values(), *([] if sheet is None else [sheet])):
+        if path in written:
+            raise Problem(f"More than one picture would be written to {path}.", "Give the scenes different names.")
+        written.add(path)
+    for way in ways:
+        yield replace(_picture(job, way, paths[way.name], options, warm), sheet=sheet)
+    if sheet is not None and job.sheet.cells:
+        with replacing(sheet) as path:
+            write_png(path, job.sheet.image())
+
+
+def _picture(job: _Job, way: _Way, path: Path, options: RenderOptions, warm: set[str]) -> Picture:
     width, height = job.size
     budget = Budget(int(options.budget * width * height), job.tail.name, job.tail.g)
     about = Picture(
@@ -184,36 +256,31 @@ def _picture(job: _Job, each: Technique, path: Path, options: RenderOptions, war
         view=job.chosen.view.name,
         view_how=job.chosen.how,
         frame=job.frame,
-        technique=each.name,
-        family=TECHNIQUES[each.name].family,
+        technique=way.name,
+        family=TECHNIQUES[way.name].family,
         width=width,
         height=height,
-        budget=budget.fragments,
+        samples=options.samples,
+        budget=options.samples * budget.fragments,
         tail=job.tail.name,
         warnings=job.scene.gpu().scene.warnings,
     )
+    subject = job.subject(options)
     try:
-        if each.name not in warm:
-            warm.add(each.name)
-            _shoot(job, each, replace(budget, fragments=2 * _WARM_SIZE[0] * _WARM_SIZE[1]), _WARM_SIZE, options)
-        frame, rendered = _shoot(job, each, budget, job.size, options)
+        if way.name not in warm:
+            # Drivers compile, allocate and place memory at its first use: what is timed is not the first frame.
+            warm.add(way.name)
+            shoot(replace(subject, samples=1, aovs=()), (way.warm,), budget)
+        shot = shoot(subject, way.samples, budget)
     except Problem as problem:
         if problem.code != ExitCode.LIMIT or len(options.techniques) == 1:
             raise
         return _unrendered(about, job, options, problem)
-    found = _measured(about, rendered, frame)
+    found = _measured(about, shot)
     if options.compare:
-        found = _compared(found, rendered, _shoot(job, SBuffer(), budget, job.size, options)[1])
-    _write(found, rendered, job, options)
+        found = _compared(found, shot, job, options)
+    _write(found, shot, job, options)
     return found
-
-
-def _shoot(
-    job: _Job, each: Technique, budget: Budget, size: tuple[int, int], options: RenderOptions
-) -> tuple[Frame, Rendered]:
-    """A technique on a frame of its own: nothing that another one left there is reused."""
-    frame = Frame(job.scene.gpu(), job.chosen.view, *size, options.background)
-    return frame, each.render(frame, budget)
 
 
 def _unrendered(about: Picture, job: _Job, options: RenderOptions, problem: Problem) -> Picture:
@@ -234,40 +301,45 @@ def _unrendered(about: Picture, job: _Job, options: RenderOptions, problem: Prob
     )
 
 
-def _measured(about: Picture, rendered: Rendered, frame: Frame) -> Picture:
-    n = frame.count()
-    k = rendered.k[n > 0]
-    skips = {**rendered.skips, HIDDEN_FRAGMENTS: hidden_fragments(frame)}
+def _measured(about: Picture, shot: Shot) -> Picture:
     return replace(
         about,
-        fragments=int(n.sum(dtype=np.int64)),
-        captured=rendered.captured,
-        k=(int(k.min(initial=np.iinfo(np.int32).max)), int(k.max())) if len(k) else (0, 0),
-        passes=dict(rendered.passes),
-        pool_bytes=rendered.pool_bytes,
-        pixel_bytes=rendered.pixel_bytes,
-        total_bytes=rendered.total_bytes,
-        fits=fits(rendered.pool_bytes),
-        skips={what: count for what, count in skips.items() if count},
+        fragments=shot.fragments,
+        captured=shot.captured,
+        k=shot.k,
+        passes=dict(shot.passes),
+        pool_bytes=shot.pool_bytes,
+        pixel_bytes=shot.pixel_bytes,
+        total_bytes=shot.total_bytes,
+        fits=fits(shot.pool_bytes),
+        skips=dict(shot.skips),
     )
 
 
-def _compared(found: Picture, rendered: Rendered, exact: Rendered) -> Picture:
-    test, reference = display8(rendered.linear), display8(exact.linear)
+def _compared(found: Picture, shot: Shot, job: _Job, options: RenderOptions) -> Picture:
+    """With its errors against the exact picture of as many samples; it is on the contact sheet then."""
+    if not job.exact:
+        subject = replace(job.subject(options), aovs=())
+        job.exact.append(shoot(subject, (SBuffer(),) * options.samples, Budget(found.budget)))
+    test, reference = display8(shot.linear), display8(job.exact[0].linear)
     error = metrics.mse(test, reference)
     psnr = None if error == 0.0 else metrics.psnr(error)
+    milliseconds = found.milliseconds or 0.0
+    caption = f"MSE {1e5 * error:.4g}e-5, {milliseconds:.1f} ms" if error else f"no error, {milliseconds:.1f} ms"
+    job.sheet.add(full_title(found.technique), caption, test, reference, (error, milliseconds))
     return replace(found, mse=error, psnr=psnr, flip=metrics.flip(test, reference)[0])
 
 
-def _write(found: Picture, rendered: Rendered, job: _Job, options: RenderOptions) -> None:
+def _write(found: Picture, shot: Shot, job: _Job, options: RenderOptions) -> None:
     if found.file.suffix.lower() == ".png":
         with replacing(found.file) as path:
-            write_png(path, display8(rendered.linear))
+            write_png(path, display8(shot.linear))
         return
     passes = found.passes or {}
     attributes: dict[str, Attribute] = {
         "software": "diaphane",
         "technique": found.technique,
+        "samples": str(found.samples),
         "fragments": str(found.fragments),
         "milliseconds": ", ".join(f"{name} {ms:.3f}" for name, ms in passes.items()),
         "poolBytes": str(found.pool_bytes),
@@ -278,7 +350,8 @@ def _write(found: Picture, rendered: Rendered, job: _Job, options: RenderOptions
     scene = job.scene.gpu().scene
     attributes |= camera_attributes(job.chosen.view, scene, found.width, found.height)
     with replacing(found.file) as path:
-        write_exr(path, rendered.linear, attributes, options.is_full)
+        planes = {CHANNELS[name]: plane for name, plane in shot.aovs.items()}
+        write_exr(path, shot.linear, attributes, options.is_full, planes)
 
 
 def size_of(options: RenderOptions, aspect: float) -> tuple[int, int]:

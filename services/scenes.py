@@ -214,13 +214,13 @@ def _check_paths(root: str, files: Mapping[str, str]) -> None:
     if root not in files or not root.lower().endswith(SUFFIXES):
         raise Problem(
             "The root of the scene is not one of its files, or not of a known type.",
-            f"Name the file that is to be opened: {', '.join(SUFFIXES)}.",
+            f"Name the root file: {', '.join(SUFFIXES)}.",
         )
     folded = {path.casefold() for path in files}
     parents = {parent.as_posix().casefold() for path in files for parent in PurePosixPath(path).parents}
     if len(folded) != len(files) or folded & parents:
         raise Problem(
-            "Two files of the scene have names that cannot be side by side on every file system.",
+            "Two files of the scene have names that some file systems cannot tell apart.",
             "Give them names that differ in more than case.",
         )
 

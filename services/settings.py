@@ -95,7 +95,7 @@ class Settings(BaseSettings):
     @model_validator(mode="after")
     def _patient(self) -> Self:
         if self.ttl < 3.0 * self.heartbeat:
-            raise ValueError("DIAPHANE_TTL has to be at least three times DIAPHANE_HEARTBEAT")
+            raise ValueError("DIAPHANE_TTL must be at least three times DIAPHANE_HEARTBEAT")
         return self
 
     @field_validator("proxies")

@@ -145,7 +145,7 @@ def _made(runner: Runner, stage: Stage[P, F], asked: Sequence[Task]) -> list[F |
         raise Problem(
             f"The stage {stage.name} failed for {'each of its ' if len(asked) > 1 else 'its '}{len(asked)} "
             f"task{'s' if len(asked) > 1 else ''}.",
-            "See the reasons in the tasks of the job; a retry continues with what was made.",
+            "See the reasons in the tasks of the job; a retry continues from what was made.",
             ExitCode.CHECK_FAILED,
         )
     return [None if facts is None else stage.facts.model_validate(facts) for facts in made]

@@ -42,6 +42,11 @@ def title(technique: str) -> str:
     return TITLES.get(technique, technique)
 
 
+def full_title(technique: str) -> str:
+    """Short title of a technique with its name: `VKB (kbuffer-importance)`; the name alone where it is the title."""
+    return technique if title(technique) == technique else f"{title(technique)} ({technique})"
+
+
 def geometric_mean(values: Sequence[float]) -> float | None:
     """exp(mean(log v)) of positive values; None of none."""
     return math.exp(math.fsum(map(math.log, values)) / len(values)) if values else None

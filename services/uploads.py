@@ -225,7 +225,7 @@ def _set_received(connection: sa.Connection, upload_id: str, end: int) -> None:
 def _row(connection: sa.Connection, query: sa.Select[Any], upload_id: str) -> Any:
     row = connection.execute(query).mappings().first()
     if row is None:
-        raise Problem(f"There is no upload {upload_id}.", "Begin a new upload.", ExitCode.NOT_FOUND)
+        raise Problem(f"There is no upload {upload_id}.", "Start a new upload.", ExitCode.NOT_FOUND)
     return row
 
 

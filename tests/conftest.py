@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import tempfile
 from collections.abc import Callable, Iterator
@@ -12,6 +13,7 @@ import moderngl
 import pytest
 from hypothesis import settings
 from support.browser import CHROMIUM, browser
+from support.kernels import compile_in_turns
 from support.postgres import Postgres
 from support.s3 import S3Server, environment
 
@@ -27,9 +29,14 @@ Machine = Callable[[str], Storage]
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# Whoever runs the tests may have a configuration of their own, which they do not read.
+os.environ["XDG_CONFIG_HOME"] = str(Path(tempfile.gettempdir()) / "diaphane-no-configuration")
+
 # Failing examples are printed as code, so the same examples everywhere cost nothing; a shared machine has no deadline.
 settings.register_profile("diaphane", deadline=None, max_examples=50, derandomize=True, database=None)
 settings.load_profile("diaphane")
+
+compile_in_turns()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

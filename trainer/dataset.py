@@ -108,14 +108,22 @@ class ViewData:
         return self.part(np.sort(np.random.default_rng(seed).choice(self.rows, size=rows, replace=False)))
 
     def blocks(self, chosen: NDArray[np.int64] | None) -> ViewData:
-        """Some blocks of `BLOCK_ROWS` rows, by rising number; None: all rows."""
+        """Some blocks of `BLOCK_ROWS` rows, by rising number; None: all rows.
+
+        Args:
+            chosen: int64 [blocks], ascending numbers of blocks; None: all.
+        """
         if chosen is None:
             return self
         rows = (chosen[:, None] * BLOCK_ROWS + np.arange(BLOCK_ROWS)).ravel()
         return self.part(rows[rows < self.rows])
 
     def part(self, chosen: NDArray[np.int64]) -> ViewData:
-        """Some rows, by rising index; prices and scale stay those of the whole."""
+        """Some rows, by rising index; prices and scale stay those of the whole.
+
+        Args:
+            chosen: int64 [rows], ascending indices of rows.
+        """
         starts, counts = self.offsets[chosen], np.diff(self.offsets)[chosen]
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         segments = np.arange(offsets[-1]) + np.repeat(starts - offsets[:-1], counts)
@@ -133,7 +141,11 @@ class ViewData:
         )
 
     def prior(self, rows: NDArray[np.int64] | slice) -> NDArray[np.float32]:
-        """What the tail tells of the log gain of each bin of some rows, float32 [rows, B]."""
+        """What the tail tells of the log gain of each bin of some rows, float32 [rows, B].
+
+        Args:
+            rows: int64 [rows], indices of rows, or a slice of them.
+        """
         return feature_prior(self.features[rows], self.bin_counts[rows], TAILS[self.tail])
 
     def moments(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -388,7 +400,11 @@ def normalisation(
 
 
 def moments(features: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Means of the columns of float32 [R, C] and of their squares, float64 [C] each."""
+    """Means of the columns of float32 [R, C] and of their squares, float64 [C] each.
+
+    Args:
+        features: float32 [R, C], one row per pixel.
+    """
     return features.mean(axis=0, dtype=np.float64), np.square(features, dtype=np.float64).mean(axis=0)
 
 

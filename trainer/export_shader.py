@@ -111,6 +111,9 @@ def normalised(weights: Weights) -> list[str]:
 def rounded(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Float32 numbers that float16 holds, the nearest ones.
 
+    Args:
+        values: float32 of any shape.
+
     Raises:
         ValueError: One is not finite, or too large for float16.
     """

@@ -68,6 +68,11 @@ def with_paper_inputs(
 def paper_inputs(view: ViewData, rows: NDArray[np.int64] | slice, budget: int) -> NDArray[np.float32]:
     """What the network reads of some rows at a budget, float32 [R, 12], columns `PAPER_FEATURES`.
 
+    Args:
+        view: Rows with the inputs of the paper.
+        rows: int64 [R], indices of rows, or a slice of them.
+        budget: F, fragments.
+
     Raises:
         Problem: The view has no `PaperInputs`.
     """

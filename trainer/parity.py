@@ -94,7 +94,12 @@ def _float16(weights: Weights, inputs: NDArray[np.float32], truth: NDArray[np.fl
 
 
 def torch_outputs(weights: Weights, inputs: NDArray[np.float32]) -> NDArray[np.float32]:
-    """float32 [R, outputs] of torch; inputs float32 [R, F] in the order of the weights' features."""
+    """float32 [R, outputs] of torch; inputs float32 [R, F] in the order of the weights' features.
+
+    Args:
+        weights: The network.
+        inputs: float32 [R, F], features, not normalised, R >= 1.
+    """
     model = Network.from_weights(weights)
     parts = []
     with torch.no_grad():

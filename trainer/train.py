@@ -27,7 +27,7 @@ from trainer.checkpoint import Checkpoint, Step, data_key, load_checkpoint, save
 from trainer.config import TrainConfig
 from trainer.dataset import GROUP, Drawing
 from trainer.evaluate import BudgetScore, geometric_mean
-from trainer.heads import HEADS, Head
+from trainer.heads import HEADS
 from trainer.log import TrainLog
 from trainer.models import Network
 from trainer.sgd import Optimiser
@@ -77,7 +77,6 @@ def train(
     replay: Sequence[View] = (),
     log: Path | None = None,
     team: Team | None = None,
-    head: Head | None = None,
 ) -> TrainResult:
     """Train a network.
 
@@ -94,8 +93,6 @@ def train(
         replay: Views of an earlier data set, mixed in so that what `start` knows of them is not forgotten.
         log: File of JSON lines (`trainer.log`) that is written meanwhile.
         team: The processes that train together; None: this one alone.
-        head: Network, loss and score; None: those of the preset. A checkpoint does not know it: use another file for
-            another head.
 
     Returns:
         The best state. The same for the same data, configuration and number of threads, interrupted or not.
@@ -115,7 +112,7 @@ def train(
         held_out = [view for view in (*views, *replay) if view.asset in kept_out]
         views, replay = ([view for view in given if view.asset not in kept_out] for given in (views, replay))
     with _deterministic(config.threads):
-        run = _Run(views, held_out, replay, config, start, checkpoint, team or Alone(), head or HEADS[config.preset])
+        run = _Run(views, held_out, replay, config, start, checkpoint, team or Alone())
         lines = TrainLog(log if run.team.rank == 0 else None, run.state.step, config.batch)
         while run.state.step < config.steps and not run.state.is_stale(config.patience):
             loss, lr = run.advance()
@@ -160,10 +157,9 @@ class _Run:
         start: Weights | None,
         checkpoint: Path | None,
         team: Team,
-        head: Head,
     ) -> None:
         self.config, self.team, self._checkpoint = config, team, checkpoint
-        self.head = head
+        self.head = HEADS[config.preset]
         self.network = self.head.network(views, config) if start is None else Network.from_weights(start)
         self.optimiser: Optimiser = self.head.optimiser(self.network)
         room = config.pool_rows // (2 if replay else 1)

@@ -66,7 +66,11 @@ class View(Protocol):
         """At most `rows` rows, drawn by `seed`, in memory."""
 
     def blocks(self, chosen: NDArray[np.int64] | None) -> ViewData:
-        """Some blocks of rows, by rising number, or all of them, in memory."""
+        """Some blocks of rows, by rising number, or all of them, in memory.
+
+        Args:
+            chosen: int64 [blocks], ascending numbers of blocks of `BLOCK_ROWS` rows; None: all.
+        """
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +122,9 @@ class ShardView:
 
     def blocks(self, chosen: NDArray[np.int64] | None) -> ViewData:
         """See `View`.
+
+        Args:
+            chosen: int64 [blocks], ascending numbers of blocks of `BLOCK_ROWS` rows; None: all.
 
         Raises:
             Problem: The shard is missing or damaged; it is named.

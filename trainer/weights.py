@@ -95,7 +95,12 @@ class Weights:
 
 
 def activate(outputs: Sequence[OutputName], raw: NDArray[np.float32]) -> NDArray[np.float32]:
-    """A network's answer, float32 [R, outputs], from what its last layer gives, of the same shape."""
+    """A network's answer, float32 [R, outputs], from what its last layer gives, of the same shape.
+
+    Args:
+        outputs: Name of each column, in order.
+        raw: float32 [R, outputs], values of the last layer.
+    """
     return np.stack([_FUNCTIONS[ACTIVATIONS[name]](raw[:, i]) for i, name in enumerate(outputs)], axis=1)
 
 

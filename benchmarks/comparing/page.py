@@ -21,8 +21,10 @@ LEARNED = "kbuffer-deep"
 """The technique whose losses the page lists."""
 DEEP_FROM = 5.0
 """N / WH from which on a view counts as deep."""
-FACTORS = (2.0, 4.0)
+FACTORS = (0.25, 1.0)
 """Of Figure 6."""
+USUAL = 1.0
+"""F / WH of the tables of all techniques."""
 
 
 def page(found: Mapping[str, BenchResult], drawn: Mapping[tuple[str, str], str]) -> str:
@@ -42,8 +44,8 @@ def page(found: Mapping[str, BenchResult], drawn: Mapping[tuple[str, str], str])
         "*certified optimum* is the least error that any allocation of the budget has with the technique's own tail. "
         "At *equal memory* each technique gets the total bytes that the fixed k-buffer takes with F = k WH, and F is "
         "what its own buffers leave of it (DHOIT, Eq. 1). Times are medians of repeats in which all techniques take "
-        "turns, on a host clock that waits for each pass; readbacks are a pass of their own; the spread is the "
-        "largest of (most - least) / median. Flicker is that of `diaphane bench`, over a path of "
+        "turns, by a clock that waits for each pass, which the next section names; readbacks are a pass of their own; "
+        "the spread is the largest of (most - least) / median. Flicker is that of `diaphane bench`, over a path of "
         f"{PATH_FRAMES} frames. Means over views are geometric for errors, arithmetic else. `kbuffer-temporal` learns "
         "from the frames before: it is measured at rest and in motion in [TEMPORAL.md](TEMPORAL.md).\n",
     ]
@@ -54,32 +56,30 @@ def page(found: Mapping[str, BenchResult], drawn: Mapping[tuple[str, str], str])
 
 def pictures(result: BenchResult) -> dict[str, str]:
     """Figure 6 as SVG files: name -> text."""
-    groups = groups_of(_first(result))
-    made = {f"figure6-{factor:g}": error_bars(groups, factor, standalone=True) for factor in FACTORS}
+    made = {
+        _figure(views, factor): error_bars(groups_of(views), factor, standalone=True)
+        for views in _settings(result)
+        for factor in FACTORS
+    }
     return {name: svg for name, svg in made.items() if svg}
 
 
 def _driver(driver: str, result: BenchResult, drawn: Mapping[tuple[str, str], str]) -> list[str]:
-    views, first = result.views, _first(result)
-    groups = groups_of(first)
-    where = said_setting(first[0])
+    views, settings = result.views, _settings(result)
     parts = [f"## {driver}\n", *(f"{line}.\n" for line in said_machines(views))]
     parts.append(_what(result))
-    parts.append(f"### Figure 6: squared error within a budget ({where})\n")
-    for factor in FACTORS:
-        if (file := drawn.get((driver, f"figure6-{factor:g}"))) is not None:
-            parts.append(f"F = {factor:g} WH:\n\n![Squared error within F = {factor:g} WH, by scene]({file})\n")
-        parts.append(f"F = {factor:g} WH; the least of what a renderer can run is bold:\n")
-        parts.append(tables.errors(groups, factor))
+    for first in settings:
+        parts += _errors(driver, first, drawn)
     parts.append("### Score q, all views\n")
     parts.append(tables.scores(views))
-    parts.append("By opacity and size, F = 1 / 2 / 4 WH; a dash where the budget holds every view entirely:\n")
+    parts.append("By opacity and size, budgets ascending; a dash where the budget holds every view entirely:\n")
     parts.append(tables.scores_by_setting(views))
-    parts.append(_tables_of_the_paper(groups))
-    parts.append(f"### Every technique ({where}, bounded ones at F = {FACTORS[0]:g} WH)\n")
-    parts.append(tables.everything(first, FACTORS[0]))
-    if counted := work(first, FACTORS[0], result.device):
-        parts += [f"### What a frame does ({where}, bounded ones at F = {FACTORS[0]:g} WH)\n", counted]
+    parts.append(_tables_of_the_paper(groups_of(settings[-1])))
+    for first in settings:
+        where = f"{said_setting(first[0])}, bounded ones at F = {USUAL:g} WH"
+        parts += [f"### Every technique ({where})\n", tables.everything(first, USUAL)]
+        if counted := work(first, USUAL, result.device):
+            parts += [f"### What a frame does ({where})\n", counted]
     parts.append("### Where each wins\n")
     parts.append(
         "On how many of the scenes (each opacity and size apart) a technique is on a Pareto front (no other has "
@@ -101,6 +101,24 @@ def _driver(driver: str, result: BenchResult, drawn: Mapping[tuple[str, str], st
     )
     parts.append(tables.depths(every))
     return parts
+
+
+def _errors(driver: str, views: Sequence[BenchView], drawn: Mapping[tuple[str, str], str]) -> list[str]:
+    """Figure 6 of one setting, and its numbers."""
+    parts = [f"### Figure 6: squared error within a budget ({said_setting(views[0])})\n"]
+    for factor in FACTORS:
+        if (file := drawn.get((driver, _figure(views, factor)))) is not None:
+            parts.append(f"F = {factor:g} WH:\n\n![Squared error within F = {factor:g} WH, by scene]({file})\n")
+            parts.append(f"F = {factor:g} WH; the least of what a renderer can run is bold:\n")
+            parts.append(tables.errors(groups_of(views), factor))
+    return parts
+
+
+def _figure(views: Sequence[BenchView], factor: float) -> str:
+    """Name of Figure 6 of one setting."""
+    one = views[0]
+    setting = "authored" if one.alpha is None else f"alpha{one.alpha:g}"
+    return f"figure6-{setting}-{one.width}x{one.height}-{factor:g}"
 
 
 def _what(result: BenchResult) -> str:
@@ -133,7 +151,7 @@ def _tables_of_the_paper(groups: Sequence[Group]) -> str:
     named = {tables.scene_of(each): each for each in groups}
     rows = [(named[scene], factor) for scene, factor in PAPER if scene in named]
     # Where the shared scenes are missing, any other shows the same.
-    rows = rows or [(groups[0], FACTORS[0])]
+    rows = rows or [(groups[0], USUAL)]
     parts = []
     for number, write, about in (
         (1, tables.stages, "milliseconds of the stages"),
@@ -147,7 +165,9 @@ def _tables_of_the_paper(groups: Sequence[Group]) -> str:
     return "\n".join(parts)
 
 
-def _first(result: BenchResult) -> list[BenchView]:
-    """Views with the opacity and size that the suite begins with."""
-    one = result.views[0]
-    return [v for v in result.views if (v.alpha, v.width, v.height) == (one.alpha, one.width, one.height)]
+def _settings(result: BenchResult) -> list[list[BenchView]]:
+    """Views of each opacity and size, in the order in which they were measured."""
+    found: dict[tuple[float | None, int, int], list[BenchView]] = {}
+    for view in result.views:
+        found.setdefault((view.alpha, view.width, view.height), []).append(view)
+    return list(found.values())

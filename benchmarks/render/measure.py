@@ -14,12 +14,13 @@ from renderer.fragment_list import KEY_BYTES, PLACE_BYTES
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.hidden import hidden_fragments
-from renderer.techniques import Budget, KBufferDeep, KBufferImportance, Technique
+from renderer.techniques import Budget, KBufferDeep, Technique, technique
+from renderer.timing import READBACK, recording, shared_clock
 from schemas.bundle import load_manifest
 
 SIZE = (1430, 960)
-FACTOR = 2
-"""F / (W H) of the bounded techniques."""
+EXACT = "sbuffer"
+"""What the other techniques' frames are compared with."""
 _EMPTY = "benchmark/empty.frag"
 
 
@@ -72,31 +73,33 @@ def _captures(frame: Frame) -> Callable[[], object]:
     return lambda: capture(frame)
 
 
-def learned_cost(subject: Subject, bundle: Path, rounds: int) -> dict[str, Any]:
-    """What `kbuffer-deep` costs beyond `kbuffer-importance`, with the network in GLSL and in onnxruntime."""
+def frame_costs(subject: Subject, bundle: Path, rounds: int) -> dict[str, Any]:
+    """Whole frames by technique and pass, by the clock that others on the machine do not change."""
     tail = load_manifest(bundle).tail
-    budget = Budget(FACTOR * SIZE[0] * SIZE[1], tail.name, tail.g)
+    budget = Budget(SIZE[0] * SIZE[1], tail.name, tail.g)
     made: dict[str, Technique] = {
-        "importance": KBufferImportance(),
-        "deep, GLSL": KBufferDeep(bundle, "glsl"),
-        "deep, onnxruntime": KBufferDeep(bundle, "onnx"),
+        EXACT: technique(EXACT),
+        **{name: technique(name) for name in ("weighted-blended", "moment", "binned")},
+        "kbuffer-deep": KBufferDeep(bundle, "glsl"),
+        "kbuffer-deep, onnxruntime": KBufferDeep(bundle, "onnx"),
     }
     passes: dict[str, list[dict[str, float]]] = {name: [] for name in made}
-
-    def run(name: str) -> Callable[[], object]:
-        def call() -> None:
-            passes[name].append(made[name].render(Frame(subject.gpu, subject.views[0], *SIZE), budget).passes)
-
-        return call
-
-    times = in_turns(rounds, {name: run(name) for name in made})
-    base = times["importance"]
+    seconds = shared_clock(subject.gpu.ctx)
+    for number in range(rounds + 1):
+        for name, each in made.items():
+            with recording(subject.gpu.ctx, seconds) as found:
+                rendered = each.render(Frame(subject.gpu, subject.views[0], *SIZE), budget)
+            if number:
+                passes[name].append({key: ms for key, ms in found.passes.items() if key != READBACK})
+            if name == EXACT:
+                fragments = rendered.captured
+    frames = {name: float(np.median([sum(each.values()) for each in found])) for name, found in passes.items()}
     return {
         "scene": subject.name,
-        "times": times,
-        "extra_ms": {name: times[name]["median"] - base["median"] for name in made if name != "importance"},
-        "ratio": {name: times[name]["median"] / base["median"] for name in made if name != "importance"},
-        "passes": {name: _medians(found[1:]) for name, found in passes.items()},
+        "fragments_per_pixel": fragments / (SIZE[0] * SIZE[1]),
+        "frames": frames,
+        "ratio": {name: ms / frames[EXACT] for name, ms in frames.items()},
+        "passes": {name: _medians(found) for name, found in passes.items()},
     }
 
 

@@ -44,7 +44,11 @@ class Light:
         self.transmittance *= 1.0 - alpha
 
     def over(self, behind: NDArray[np.float64]) -> NDArray[np.float64]:
-        """float64 [3], the layers over a colour."""
+        """float64 [3], the layers over a colour.
+
+        Args:
+            behind: float64 [3], linear RGB of what lies behind the layers.
+        """
         return np.asarray(self.rgb + self.transmittance * behind)
 
 

@@ -17,7 +17,11 @@ _FAR = 1e6
 
 
 def warped(depth: NDArray[np.float32]) -> Floats:
-    """Where depths lie between their least and greatest, on a logarithmic scale, float64 [n] in [-1, 1]."""
+    """Where depths lie between their least and greatest, on a logarithmic scale, float64 [n] in [-1, 1].
+
+    Args:
+        depth: float32 [n], view-space distances of a pixel's fragments, metres, > 0; n >= 1.
+    """
     logs = np.log(depth.astype(np.float64))
     extent = logs.max() - logs.min()
     return np.asarray(2.0 * (logs - logs.min()) / extent - 1.0) if extent > 0.0 else np.full(len(depth), -1.0)

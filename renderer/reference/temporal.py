@@ -53,7 +53,11 @@ def nothing(pixels: int) -> Remembered:
 
 
 def unpacked(words: NDArray[np.uint32]) -> Remembered:
-    """The fields of words."""
+    """The fields of words.
+
+    Args:
+        words: uint32 of any shape, what pixels remember; 0: nothing.
+    """
     whole = words.astype(np.int64)
     is_open = whole != 0
     return Remembered(

@@ -10,6 +10,7 @@ from PIL import Image
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
 from renderer.samples.shapes import Floats, Polygons, sphere
+from renderer.usd.licence import LICENCE_KEYS
 
 Colour = tuple[float, float, float]
 
@@ -26,7 +27,8 @@ class StageAuthor:
     def __init__(self, file: Path, up: str = "Y", metres: float = 1.0) -> None:
         self.file = file
         self.stage = Usd.Stage.CreateInMemory()
-        self.stage.SetMetadata("comment", "A sample scene of Diaphane; Apache-2.0.")
+        self.stage.SetMetadata("comment", "A sample scene of Diaphane.")
+        self.stage.GetRootLayer().customLayerData = {LICENCE_KEYS[0]: "Apache-2.0"}
         UsdGeom.SetStageUpAxis(self.stage, up)
         UsdGeom.SetStageMetersPerUnit(self.stage, metres)
         self.stage.SetDefaultPrim(UsdGeom.Xform.Define(self.stage, "/World").GetPrim())

@@ -195,7 +195,12 @@ def disc(radius: float, thickness: float, around: int = 64) -> Polygons:
 
 
 def voxel_faces(filled: NDArray[np.bool_], hidden_by: NDArray[np.bool_]) -> Polygons:
-    """Faces of the filled cells of a grid [X, Y, Z] that no cell of `hidden_by` touches; cells have side 1."""
+    """Faces of the filled cells of a grid [X, Y, Z] that no cell of `hidden_by` touches; cells have side 1.
+
+    Args:
+        filled: bool [X, Y, Z], the cells that have faces.
+        hidden_by: bool [X, Y, Z], cells that hide the faces that touch them.
+    """
     unit = box((1.0, 1.0, 1.0)).moved(by=(0.5, 0.5, 0.5))
     directions = [(0, 0, -1), (0, 0, 1), (0, -1, 0), (0, 1, 0), (-1, 0, 0), (1, 0, 0)]
     around = np.pad(hidden_by, 1)

@@ -195,6 +195,11 @@ def _combine(inner: NDArray[np.float64], outer: NDArray[np.float64], prim: Usd.P
 
 
 def product(first: NDArray[np.float64], then: NDArray[np.float64]) -> NDArray[np.float64]:
-    """One transform after the other; what is not finite stays so, for the bounds to find."""
+    """One transform after the other; what is not finite stays so, for the bounds to find.
+
+    Args:
+        first: float64 [..., 4, 4], the transforms that are applied first, to row vectors.
+        then: float64 [..., 4, 4], those that follow.
+    """
     with np.errstate(invalid="ignore", over="ignore"):
         return np.asarray(first @ then)

@@ -12,12 +12,22 @@ CREASE = 30.0
 
 
 def face_normals(points: NDArray[np.float64], topology: Topology) -> Attribute:
-    """Unit normal of each face: the sum of its triangles' area vectors, which is Newell's normal."""
+    """Unit normal of each face: the sum of its triangles' area vectors, which is Newell's normal.
+
+    Args:
+        points: float64 [P, 3], positions in any one unit.
+        topology: Faces and triangles over these points.
+    """
     return _of_faces(_areas(points, topology), topology)
 
 
 def vertex_normals(points: NDArray[np.float64], topology: Topology) -> Attribute:
-    """Unit normal of each point: the area-weighted mean of its triangles."""
+    """Unit normal of each point: the area-weighted mean of its triangles.
+
+    Args:
+        points: float64 [P, 3], positions in any one unit.
+        topology: Faces and triangles over these points.
+    """
     return _of_points(_areas(points, topology), topology)
 
 
@@ -25,6 +35,10 @@ def creased_normals(points: NDArray[np.float64], topology: Topology) -> Attribut
     """Unit normals of polygons that have none: a point's mean where all its faces are within CREASE of it, else flat.
 
     USD leaves such polygons flat. Tessellated curves look, and compress, better with this; boxes stay flat.
+
+    Args:
+        points: float64 [P, 3], positions in any one unit.
+        topology: Faces and triangles over these points.
     """
     areas = _areas(points, topology)
     flat = topology.spread(_of_faces(areas, topology), "corner")
@@ -49,7 +63,11 @@ def _of_points(areas: NDArray[np.float64], topology: Topology) -> Attribute:
 
 
 def unit_rows(vectors: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Rows scaled to unit length, float32 [n, 3]; a zero row becomes +z, so that shading stays finite."""
+    """Rows scaled to unit length, float32 [n, 3]; a zero row becomes +z, so that shading stays finite.
+
+    Args:
+        vectors: [n, 3], directions of any length.
+    """
     rows = np.asarray(vectors, dtype=np.float64)
     largest = np.abs(rows).max(axis=1, keepdims=True)
     rows = np.divide(rows, largest, out=np.zeros_like(rows), where=largest > 0)

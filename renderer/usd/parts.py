@@ -206,7 +206,12 @@ class _PartBuilder:
 
 
 def degenerate(positions: NDArray[np.float64], triangles: NDArray[np.int64]) -> Mask:
-    """Which triangles have no area, bool [T]."""
+    """Which triangles have no area, bool [T].
+
+    Args:
+        positions: float64 [P, 3], points in any one unit.
+        triangles: int64 [T, 3], indices of points.
+    """
     return np.asarray(~np.any(area_vectors(positions, triangles), axis=1))
 
 

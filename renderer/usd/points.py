@@ -42,7 +42,12 @@ class PointsLayout:
         return {"constant": 1, "uniform": self.count, "varying": self.count, "vertex": self.count}
 
     def carry(self, values: NDArray[np.float32], interpolation: str) -> Attribute:
-        """See Layout."""
+        """See Layout.
+
+        Args:
+            values: float32 [n, width], one row for each element that `interpolation` counts.
+            interpolation: Of the primvar, as USD names it: `constant`, `uniform`, `varying`, `vertex` or `faceVarying`.
+        """
         if interpolation == "constant":
             return Attribute(values, "constant")
         return Attribute(np.repeat(values, self.size, axis=0), "vertex")

@@ -28,7 +28,12 @@ class Layout(Protocol):
         """How many values each interpolation has."""
 
     def carry(self, values: NDArray[np.float32], interpolation: str) -> Attribute:
-        """As many values as `sizes` says, float32 [n, width], on the surface that is drawn."""
+        """As many values as `sizes` says, float32 [n, width], on the surface that is drawn.
+
+        Args:
+            values: float32 [n, width], one row for each element that `interpolation` counts.
+            interpolation: Of the primvar, as USD names it: `constant`, `uniform`, `varying`, `vertex` or `faceVarying`.
+        """
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +47,12 @@ class MeshLayout:
         return {name: self.topology.rows(domain) for name, domain in DOMAINS.items()}
 
     def carry(self, values: NDArray[np.float32], interpolation: str) -> Attribute:
-        """See Layout."""
+        """See Layout.
+
+        Args:
+            values: float32 [n, width], one row for each element that `interpolation` counts.
+            interpolation: Of the primvar, as USD names it: `constant`, `uniform`, `varying`, `vertex` or `faceVarying`.
+        """
         return Attribute(values, DOMAINS[interpolation])
 
 

@@ -81,7 +81,12 @@ class RefinedLayout:
         return MeshLayout(self.cage).sizes()
 
     def carry(self, values: NDArray[np.float32], interpolation: str) -> Attribute:
-        """See Layout."""
+        """See Layout.
+
+        Args:
+            values: float32 [n, width], one row for each element that `interpolation` counts.
+            interpolation: Of the primvar, as USD names it: `constant`, `uniform`, `varying`, `vertex` or `faceVarying`.
+        """
         if interpolation == "constant":
             return Attribute(values, "constant")
         if interpolation == "uniform":

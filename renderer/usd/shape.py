@@ -61,6 +61,10 @@ class Reading:
     def posed(self, points: NDArray[np.float64], prim: Usd.Prim) -> NDArray[np.float64]:
         """Points as the skin deforms them, float64 [P, 3].
 
+        Args:
+            points: float64 [P, 3], positions at rest, in the prim's own space.
+            prim: Prim that the points belong to, for the message.
+
         Raises:
             Problem: One is NaN or infinite.
         """
@@ -86,7 +90,12 @@ def integers(values: object) -> NDArray[np.int64]:
 
 
 def check_finite(points: NDArray[np.float64], prim: Usd.Prim) -> None:
-    """Raises Problem if a point is NaN or infinite."""
+    """Raises Problem if a point is NaN or infinite.
+
+    Args:
+        points: float64 [P, 3], positions.
+        prim: Prim that the points belong to, for the message.
+    """
     bad = int(np.count_nonzero(~np.isfinite(points).all(axis=1)))
     if bad:
         raise Problem(

@@ -129,7 +129,12 @@ def _folded(
 
 
 def area_vectors(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Twice the area times the normal of each triangle of points, float64 [T, 3]."""
+    """Twice the area times the normal of each triangle of points, float64 [T, 3].
+
+    Args:
+        points: float64 [P, 3], positions in any one unit; the result is in its square.
+        triangles: int64 [T, 3], indices of points.
+    """
     a = points[triangles[:, 0]]
     u, v = points[triangles[:, 1]] - a, points[triangles[:, 2]] - a
     # Written out: numpy's own cross product takes three times as long.
@@ -138,5 +143,11 @@ def area_vectors(points: NDArray[np.float64], triangles: NDArray[np.int64]) -> N
 
 
 def sum_by(keys: NDArray[np.int64], vectors: NDArray[np.float64], size: int) -> NDArray[np.float64]:
-    """Sums of the rows with the same key, float64 [size, 3]."""
+    """Sums of the rows with the same key, float64 [size, 3].
+
+    Args:
+        keys: int64 [R], from 0 to `size` - 1.
+        vectors: float64 [R, 3], the rows.
+        size: Number of sums.
+    """
     return np.stack([np.bincount(keys, vectors[:, axis], minlength=size) for axis in range(3)], axis=1)

@@ -52,13 +52,17 @@ def planned(options: BenchOptions, bundle: Bundle | None) -> list[CellKey]:
             cells.append(CellKey(technique=name, basis="none"))
             continue
         for tail, g, label in _tails(name, options, bundle):
-            bases: Sequence[Basis] = ("fragments", "memory") if options.equal_memory else ("fragments",)
             cells += [
                 CellKey(technique=name, basis=basis, budget_factor=factor, tail=tail, g=g, bundle=label)
                 for factor in options.factors
-                for basis in bases
+                for basis in _bases(options, factor)
             ]
     return cells
+
+
+def _bases(options: BenchOptions, factor: float) -> Sequence[Basis]:
+    """What budgets are equal in; the fixed k-buffer, whose memory the others get, has at least one slot a pixel."""
+    return ("fragments", "memory") if options.equal_memory and factor >= 1.0 else ("fragments",)
 
 
 def _tails(name: str, options: BenchOptions, bundle: Bundle | None) -> list[tuple[TailName, float | None, str | None]]:

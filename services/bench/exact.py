@@ -43,5 +43,9 @@ class Exact:
         return linear_to_srgb(self.linear).astype(np.float32)
 
     def display_error(self, linear: NDArray[np.floating]) -> float:
-        """Mean squared difference of sRGB values before rounding, of a picture as linear RGB, [P, 3]."""
+        """Mean squared difference of sRGB values before rounding, of a picture as linear RGB, [P, 3].
+
+        Args:
+            linear: [P, 3], linear RGB of the picture, row 0 at the top.
+        """
         return float(np.mean(np.square(linear_to_srgb(linear) - self.display, dtype=np.float64)))

@@ -62,14 +62,27 @@ def camera_path(view: View, frames: int, step: float = STEP) -> list[View]:
 def error_change(
     image: NDArray[np.uint8], before: NDArray[np.uint8], exact: NDArray[np.uint8], exact_before: NDArray[np.uint8]
 ) -> float:
-    """`mean |(I_t - I_{t-1}) - (X_t - X_{t-1})|`, uint8 pictures of one size, in units of [0,1]."""
+    """`mean |(I_t - I_{t-1}) - (X_t - X_{t-1})|`, uint8 pictures of one size, in units of [0,1].
+
+    Args:
+        image: uint8 [H, W, 3], the picture I_t, sRGB.
+        before: uint8 [H, W, 3], the picture I_{t-1} of the frame before.
+        exact: uint8 [H, W, 3], the exact picture X_t.
+        exact_before: uint8 [H, W, 3], the exact picture X_{t-1} of the frame before.
+    """
     now = image.astype(np.int16) - exact
     then = before.astype(np.int16) - exact_before
     return float(np.abs(now - then).mean()) / 255.0
 
 
 def k_change(k: NDArray[np.int32], before: NDArray[np.int32], occupied: NDArray[np.bool_]) -> float:
-    """`mean |k_t - k_{t-1}|` over the pixels that both frames have fragments in, all [P]; 0 without any."""
+    """`mean |k_t - k_{t-1}|` over the pixels that both frames have fragments in, all [P]; 0 without any.
+
+    Args:
+        k: int32 [P], core fragments of each pixel.
+        before: int32 [P], those of the frame before.
+        occupied: bool [P], pixels with fragments in both frames.
+    """
     changed = np.abs(k - before)[occupied]
     return float(changed.mean()) if len(changed) else 0.0
 

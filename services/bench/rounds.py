@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from renderer.account.ledger import count_frame
 from renderer.techniques import TECHNIQUES, Budget, Rendered, Technique
-from renderer.timing import Recording, recording
+from renderer.timing import Recording, recording, shared_clock
 from schemas.bench import CellKey, Times
 from schemas.work import PassWork
 from services.bench.subject import Subject
@@ -44,7 +44,7 @@ class Run:
         """
         for _ in range(TECHNIQUES[self.key.technique].settles):
             start = time.perf_counter()
-            rendered, found = shoot(subject, self.technique, self.budget)
+            rendered, found = shoot(subject, self.technique, self.budget, shared_clock(subject.gpu.ctx))
             self.cost = time.perf_counter() - start
         if self.cost > limit:
             self.recordings.append(found)
@@ -56,7 +56,7 @@ class Run:
 
     def passes(self) -> dict[str, Times]:
         """Times of each pass, in the order in which they ran first."""
-        return {name: times_of([found.host[name] for found in self.recordings]) for name in self._names()}
+        return {name: times_of([found.passes[name] for found in self.recordings]) for name in self._names()}
 
     def gpu(self) -> dict[str, float]:
         """Medians by timer queries, for passes that every frame had."""
@@ -74,13 +74,15 @@ class Run:
 
     def _names(self) -> list[str]:
         # A technique that remembers may skip a pass in some frames: only those that all frames have are medians.
-        first = self.recordings[0].host if self.recordings else {}
-        return [name for name in first if all(name in found.host for found in self.recordings)]
+        first = self.recordings[0].passes if self.recordings else {}
+        return [name for name in first if all(name in found.passes for found in self.recordings)]
 
 
-def shoot(subject: Subject, technique: Technique, budget: Budget) -> tuple[Rendered, Recording]:
-    """One frame from nothing, the opaque pass included, and what it took."""
-    with recording(subject.gpu.ctx) as found:
+def shoot(
+    subject: Subject, technique: Technique, budget: Budget, seconds: Callable[[], float] = time.perf_counter
+) -> tuple[Rendered, Recording]:
+    """One frame from nothing, the opaque pass included, and what it took by a clock."""
+    with recording(subject.gpu.ctx, seconds) as found:
         rendered = technique.render(subject.frame(), budget)
     return rendered, found
 
@@ -95,10 +97,11 @@ def in_turns(subject: Subject, runs: Sequence[Run], most: int, limit: float) -> 
         limit: Seconds that the frames of one may take.
     """
     wanted = {id(run): run.repeats(most, limit) for run in runs}
+    seconds = shared_clock(subject.gpu.ctx)
     for number in range(max(wanted.values(), default=0)):
         for run in runs if number % 2 == 0 else reversed(runs):
             if number < wanted[id(run)]:
-                run.recordings.append(shoot(subject, run.technique, run.budget)[1])
+                run.recordings.append(shoot(subject, run.technique, run.budget, seconds)[1])
 
 
 def times_of(values: Sequence[float]) -> Times:

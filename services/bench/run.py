@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from labeller.budgets import default_budgets
 from renderer.context import describe, gl_context
 from renderer.scene import LoadOptions
-from renderer.timing import timers_are_right
+from renderer.timing import shared_clock, timers_are_right
 from renderer.usd.digest import scene_digest
 from schemas.bench import BenchCell, BenchResult, BenchView, CellKey, Yardstick
 from schemas.glass import DEFAULT_GLASS
@@ -249,6 +249,7 @@ def _key(place: _Place, options: BenchOptions) -> str:
         "times": (options.repeats, options.limit),
         "path": options.path,
         "driver": describe(gl_context()),
+        "clock": _clock(),
         "machine": machine(),
         **({"glass": options.glass} if options.glass != DEFAULT_GLASS else {}),
     }
@@ -256,6 +257,8 @@ def _key(place: _Place, options: BenchOptions) -> str:
 
 
 def _clock() -> str:
+    if shared_clock(gl_context()) is time.process_time:
+        return "processor time of all threads, each pass finished before and after"
     host = "host clock, each pass finished before and after"
     if timers_are_right(gl_context()):
         return f"{host}; GPU timer queries beside it"

@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from types import FrameType
-from typing import NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 from typer.exceptions import Abort, Exit, TyperException
@@ -21,6 +21,7 @@ from schemas.problem import ExitCode, Problem
 from services.cli import (
     bench,
     build,
+    config,
     dataset,
     datasets,
     dump,
@@ -46,9 +47,8 @@ from services.cli.state import DEFAULT_STATE, STATE_VARIABLE
 
 app = typer.Typer(
     name="diaphane",
-    help="Learns where a renderer should spend a fixed budget of transparent fragments.",
     no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
 )
 add_command(app, "build", build.build, "schemas.options:Options")
@@ -73,8 +73,25 @@ app.command("workers")(workers.workers)
 app.command("health")(health.health)
 
 
+def _print_version(is_asked: bool) -> None:
+    if is_asked:
+        from services.versions import diaphane_version
+
+        print(f"diaphane {diaphane_version()}")
+        raise Exit
+
+
+@app.callback()
+def common(
+    _: Annotated[
+        bool, typer.Option("--version", help="Print the version, and exit.", is_eager=True, callback=_print_version)
+    ] = False,
+) -> None:
+    """Learns where a renderer should spend a fixed budget of transparent fragments."""
+
+
 @app.command("version")
-def version(as_json: bool = typer.Option(False, "--json", help="One JSON object on stdout.")) -> None:
+def version(as_json: bool = typer.Option(False, "--json", help="Print one JSON object on stdout.")) -> None:
     """Version of Diaphane and of the libraries that can change a result."""
     from services.versions import library_versions
 
@@ -125,8 +142,10 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _call(arguments: Sequence[str]) -> int:
+    command = typer.main.get_command(app)
+    defaults = config.read().defaults(command)
     try:
-        status = typer.main.get_command(app).main(args=list(arguments), prog_name="diaphane", standalone_mode=False)
+        status = command.main(args=list(arguments), prog_name="diaphane", standalone_mode=False, default_map=defaults)
     except Exit as exit_:
         return exit_.exit_code
     except (KeyboardInterrupt, Abort):
@@ -147,7 +166,7 @@ def _disk(error: OSError) -> Problem:
 def _usage(error: TyperException, as_json: bool) -> int:
     text = error.format_message()
     if not text:  # no command was named: the help has been printed
-        return int(ExitCode.USAGE)
+        return int(ExitCode.OK)
     command = getattr(getattr(error, "ctx", None), "command_path", "diaphane")
     problem = Problem(text[0].upper() + text[1:].rstrip(".") + ".", f"See `{command} --help`.", ExitCode.USAGE)
     return output.show_problem(problem, as_json=as_json)

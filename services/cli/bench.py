@@ -18,8 +18,8 @@ from services.cli.technique_options import (
     BudgetsOption,
     InferenceOption,
     NodesOption,
-    SamplesOption,
     SteepnessOption,
+    StochasticSamplesOption,
     VkbOption,
 )
 
@@ -61,7 +61,7 @@ def bench(
     inference: InferenceOption = "glsl",
     vkb: VkbOption = "",
     nodes: NodesOption = None,
-    samples: SamplesOption = None,
+    stochastic_samples: StochasticSamplesOption = None,
     camera: CameraOption = None,
     views: Annotated[
         Path | None, typer.Option("--views", help="JSON file with views; all that it has of a scene are measured.")
@@ -118,7 +118,7 @@ def bench(
         tails=() if tails is None else parse_tails(tails),
         g=g,
         bundle=bundle,
-        needs=parse_needs(vkb, inference, nodes, samples),
+        needs=parse_needs(vkb, inference, nodes, stochastic_samples),
         camera=camera,
         views=views,
         most_views=most_views,
@@ -138,6 +138,8 @@ def bench(
     from services.bench.run import check_same_code, no_views
     from services.cli.bench_table import show
 
+    if not as_json:
+        output.tell_new_folder(out.parent)
     progress = make_progress(sys.stderr, silent=as_json)
     result = run(options, shlex.join(["diaphane", *sys.argv[1:]]), progress)
     if not result.views:

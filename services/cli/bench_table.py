@@ -7,6 +7,7 @@ from services.bench.account import COLUMNS, said_device
 from services.bench.groups import Group, Row, offline, said_budget, said_technique
 from services.cli.lines import print_columns, size
 from services.summary import MSE_FLOOR, UNFIT, number, said_unfit
+from services.wording import counted
 
 
 def show(shown: Group, device: Device) -> None:
@@ -16,8 +17,7 @@ def show(shown: Group, device: Device) -> None:
         shown: The group.
         device: What bounds of frame times are stated for.
     """
-    count = f"{len(shown.views)} view{'s' if len(shown.views) > 1 else ''}"
-    print(f"\n{shown.title}: {count}, N = {shown.depth:.1f} WH")
+    print(f"\n{shown.title}: {counted(len(shown.views), 'views')}, N = {shown.depth:.1f} WH")
     with_path = any(row.flicker is not None for row in shown.rows)
     headings = ("technique", "budget", "ms", "MSE e-5", "linear e-5", "occupied e-5", "q", "/ optimum")
     headings += ("PSNR", "SSIM", "FLIP", "captured", "k", "pool", "total", *(("flicker e-3",) if with_path else ()))

@@ -11,6 +11,7 @@ import typer
 from services.cli import output
 from services.cli.scene_options import LicenceOption
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
+from services.wording import counted
 
 if TYPE_CHECKING:
     from services.options import BuildOptions
@@ -24,30 +25,32 @@ def build(
         list[Path] | None,
         typer.Option(
             "--holdout",
-            help="Scene to evaluate on and never train on, by path or stem; repeatable. Default: a quarter.",
+            help="Evaluate on this scene and never train on it, by path or stem; repeatable. Default: a quarter.",
         ),
     ] = None,
     licence: LicenceOption = None,
     views: Annotated[
         Path | None,
-        typer.Option("--views", help="JSON file with the views of the scenes. Default: the stages' cameras."),
+        typer.Option("--views", help="Read the views of the scenes from this JSON file. Default: the stages' cameras."),
     ] = None,
     start: Annotated[
         str | None,
-        typer.Option("--from", help="Bundle to begin with: a folder, or NAME@ALIAS of the registry. Default: none."),
+        typer.Option(
+            "--from", help="Start from this pretrained bundle: a folder, or NAME@ALIAS of the registry. Default: none."
+        ),
     ] = None,
     replay: Annotated[
         Path | None,
         typer.Option(
             "--replay",
-            help="Data set that --from must not forget, so that it is trained on again. Default: that of its name.",
+            help="Train again on this data set of --from, so that it is not forgotten. Default: that of its name.",
         ),
     ] = None,
     state: StateOption = DEFAULT_STATE,
     as_json: JsonOption = False,
     **given: Any,
 ) -> None:
-    """Render, label, train, evaluate, publish and report. The same command again continues, or finds it all done."""
+    """Render, label, train, evaluate, publish and report. Builds are resumable: rerun the command to continue."""
     from schemas.options import Options
     from services import flags
     from services.options import BuildOptions, asked, parse_licences
@@ -98,7 +101,7 @@ def _show(options: BuildOptions, result: BuildResult) -> None:
         why = "No view of a scene that was held out was scored, so nothing is proven: give a second transparent scene."
         console.print(why, markup=False)
     if result.skipped:
-        skipped = ", ".join(f"{count:,} {what}" for what, count in result.skipped.items())
+        skipped = ", ".join(counted(count, what) for what, count in result.skipped.items())
         console.print(f"Skipped: {skipped}.", markup=False)
     if not result.worked:
         console.print("Nothing had to be done: every artifact was there already.", markup=False)

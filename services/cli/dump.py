@@ -25,6 +25,7 @@ from services.cli.scene_options import (
     WidthOption,
 )
 from services.cli.state import JsonOption
+from services.wording import counted
 
 if TYPE_CHECKING:
     from services.dumping import Dumped
@@ -33,9 +34,12 @@ if TYPE_CHECKING:
 def dump(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A scene, or a deep OpenEXR file to import.")],
     target: Annotated[
-        Path, typer.Option("--output", "-o", help="Folder of the dump; or a deep OpenEXR file, if it ends in .exr.")
+        Path,
+        typer.Option(
+            "--output", "-o", help="Write the dump to this folder, or to a deep OpenEXR file if it ends in .exr."
+        ),
     ],
-    is_deep: Annotated[bool, typer.Option("--exr", help="Also a deep OpenEXR file in the folder.")] = False,
+    is_deep: Annotated[bool, typer.Option("--exr", help="Also write a deep OpenEXR file into the folder.")] = False,
     camera: CameraOption = None,
     time: TimeOption = None,
     image_width: WidthOption = 960,
@@ -56,6 +60,8 @@ def dump(
     from services.scene_warnings import said_warnings
 
     load = loading(alpha, glass, variant, complexity, refine)
+    if not as_json:
+        output.tell_new_folder(target.parent)
     dumped = run(
         DumpOptions(
             file=file,
@@ -82,8 +88,8 @@ def _show(dumped: Dumped) -> None:
     pixels = dumped.width * dumped.height
     print(f"{dumped.width}x{dumped.height}, view {dumped.view[0] or '–'} ({dumped.view[1]})")
     print(
-        f"{dumped.fragments:,} fragments in {dumped.occupied:,} of {pixels:,} pixels, "
-        f"{dumped.fragments / pixels:.2f} a pixel, at most {dumped.most}"
+        f"{counted(dumped.fragments, 'fragments')} in {dumped.occupied:,} of {counted(pixels, 'pixels')}, "
+        f"{dumped.fragments / pixels:.2f} per pixel, at most {dumped.most}"
     )
     if dumped.passes:
         print(f"ms: {', '.join(f'{name} {ms:.1f}' for name, ms in dumped.passes.items())}")

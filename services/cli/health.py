@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 TIMEOUT_SECONDS = 5.0
 
 RoleOption = Annotated[
-    str | None, typer.Option("--role", help="A worker of this role on this host. Default: the server at --url.")
+    str | None, typer.Option("--role", help="Check a worker of this role on this host. Default: the server at --url.")
 ]
 LiveOption = Annotated[
-    bool, typer.Option("--live", help="Whether it runs, even if the database or the store does not answer.")
+    bool, typer.Option("--live", help="Check only that it runs, even if the database or the store does not answer.")
 ]
 
 
@@ -46,7 +46,9 @@ def _ask_server(address: str) -> None:
         urlopen(address, timeout=TIMEOUT_SECONDS).close()
     except HTTPError as error:
         raise Problem(
-            f"{address} answers {error.code}.", "The server's log says what it waits for.", ExitCode.CHECK_FAILED
+            f"{address} answers {error.code}.",
+            "See the server's log for what it is waiting for.",
+            ExitCode.CHECK_FAILED,
         ) from None
     except (URLError, OSError, ValueError) as error:
         reason = getattr(error, "reason", error)
@@ -79,15 +81,15 @@ def _look_for_worker(role: str, state: Path, *, patient: bool) -> None:
             return
         raise Problem(
             "The database does not answer, or nothing ever ran on it.",
-            "See to the server that DIAPHANE_DATABASE names.",
+            "Check the server that DIAPHANE_DATABASE names.",
             ExitCode.TRY_AGAIN,
         ) from None
     except DBAPIError:  # it has no tables yet
         heard = False
     if not heard:
         raise Problem(
-            f"No worker of the role {role} was heard from this host lately.",
-            f"Start `diaphane worker --roles {role}`; if it runs, its log says why it is silent.",
+            f"No worker of the role {role} has reported from this host recently.",
+            f"Start `diaphane worker --roles {role}`; if it runs, see its log.",
             ExitCode.CHECK_FAILED,
         )
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from services.cli.remote import Remote
 
 _ID = re.compile(r"scn_[0-9a-f]{32}")
+_FIRST_TOLD_SECONDS = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,9 +94,9 @@ def bring(remote: Remote, references: Sequence[str], *, silent: bool = False) ->
     progress = make_progress(sys.stderr, silent=silent)
     sent = upload(remote, list(packages.values()), progress)
     ids = dict(zip(packages, (scene["id"] for scene in sent), strict=True))
+    checked = await_checks(remote, [ids.get(reference, reference) for reference in references], progress)
     scenes: list[dict[str, Any]] = []
-    for reference in references:
-        scene = remote.wait_for_scene(ids.get(reference, reference))
+    for reference, scene in zip(references, checked, strict=True):
         ensure_accepted(scene, reference)
         twin = next((i for i, other in enumerate(scenes) if other["id"] == scene["id"]), None)
         if twin is not None:
@@ -128,6 +129,40 @@ def upload(remote: Remote, packages: Sequence[Package], progress: Progress) -> l
             if not sent:
                 progress.skipped("scenes that the server had already")
             stage.advance(1, package.name)
+    return scenes
+
+
+def await_checks(remote: Remote, scene_ids: Sequence[str], progress: Progress) -> list[dict[str, Any]]:
+    """Waits until the server has checked scenes, and says that it still does.
+
+    Args:
+        remote: The server.
+        scene_ids: Their ids.
+        progress: What it is said to.
+
+    Returns:
+        The scenes, accepted or rejected, in order.
+
+    Raises:
+        Problem: A check does not end.
+    """
+    scenes = []
+    with progress.stage("check scenes", len(scene_ids)) as stage:
+        for scene_id in scene_ids:
+            told = 0.0
+
+            def say(waited: float, scene: dict[str, Any]) -> None:
+                nonlocal told
+                name = plain(scene.get("name") or scene["id"])
+                stage.advance(0, f"{name} {waited:.0f} s")
+                if waited >= max(_FIRST_TOLD_SECONDS, 2.0 * told):
+                    told = waited
+                    progress.note(
+                        f"{name} is still being checked ({waited:.0f} s); `diaphane workers` shows the queue."
+                    )
+
+            scenes.append(remote.wait_for_scene(scene_id, waiting=say))
+            stage.advance(1)
     return scenes
 
 

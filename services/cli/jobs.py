@@ -18,15 +18,15 @@ app = typer.Typer(help="Jobs on a server: submit, watch, cancel, retry.", no_arg
 add_command(app, "submit", submit, "schemas.job:JobSpec", without=("kind",))
 
 JobArgument = Annotated[str, typer.Argument(metavar="ID", help="Id of the job.")]
-StateFilter = Annotated[str | None, typer.Option("--state", help="Only those in this state.")]
-StageFilter = Annotated[str | None, typer.Option("--stage", help="Only those of this stage.")]
+StateFilter = Annotated[str | None, typer.Option("--state", help="List only those in this state.")]
+StageFilter = Annotated[str | None, typer.Option("--stage", help="List only those of this stage.")]
 
 
 @app.command("list")
 def list_(
     state: StateFilter = None,
-    kind: Annotated[str | None, typer.Option("--kind", help="Only those of this kind.")] = None,
-    name: Annotated[str | None, typer.Option("--name", help="Only those that publish under this name.")] = None,
+    kind: Annotated[str | None, typer.Option("--kind", help="List only those of this kind.")] = None,
+    name: Annotated[str | None, typer.Option("--name", help="List only those that publish under this name.")] = None,
     limit: LimitOption = 50,
     url: UrlOption = DEFAULT_URL,
     key_file: KeyFileOption = None,
@@ -117,8 +117,8 @@ def tasks(
 @app.command()
 def events(
     job_id: JobArgument,
-    after: Annotated[int, typer.Option("--after", min=0, help="Only those after this number.")] = 0,
-    is_followed: Annotated[bool, typer.Option("--follow", help="Go on until the job ends.")] = False,
+    after: Annotated[int, typer.Option("--after", min=0, help="List only those after this number.")] = 0,
+    is_followed: Annotated[bool, typer.Option("--follow", help="Follow the events until the job ends.")] = False,
     url: UrlOption = DEFAULT_URL,
     key_file: KeyFileOption = None,
     as_json: JsonOption = False,

@@ -17,6 +17,7 @@ from services.cli import output
 from services.cli.lines import print_columns
 from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption, connect
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
+from services.wording import counted
 
 if TYPE_CHECKING:
     from services.keys import Keys
@@ -27,7 +28,8 @@ app = typer.Typer(
 )
 
 LocalOption = Annotated[
-    bool, typer.Option("--local", help="Without a server: in the database of the state folder, or DIAPHANE_DATABASE.")
+    bool,
+    typer.Option("--local", help="Use the database of the state folder, or DIAPHANE_DATABASE, instead of a server."),
 ]
 SCOPES = ("read", "submit", "publish", "admin")
 _DAY_SECONDS = 86400.0
@@ -35,7 +37,7 @@ _DAY_SECONDS = 86400.0
 
 @app.command()
 def create(
-    name: Annotated[str, typer.Argument(help="Who or what it is for.")],
+    name: Annotated[str, typer.Argument(help="Who or what the key is for.")],
     scope: Annotated[list[str], typer.Option("--scope", help="read, submit, publish or admin; repeatable.")],
     days: Annotated[float | None, typer.Option("--days", help="Days until it expires. Default: never.")] = None,
     job_pixels: Annotated[
@@ -58,7 +60,10 @@ def create(
     if unknown:
         raise Problem(f"There is no scope '{unknown[0]}'.", f"Choose among {', '.join(SCOPES)}: --scope read.")
     if days is not None and not 0.0 < days <= 36500.0:
-        raise Problem(f"--days {days:g} is not above 0 and at most 36500.", "Change that option.")
+        raise Problem(
+            f"--days {days:g} is not above 0 and at most 36500.",
+            "Give above 0 and at most 36500 days, or leave out --days: the key then never expires.",
+        )
     expires = None if days is None else time.time() + days * _DAY_SECONDS
     bounds = {"job_pixels": job_pixels, "job_steps": job_steps, "jobs": jobs}
     if is_local:
@@ -120,14 +125,13 @@ def rotate_signing(
     new_key: Annotated[
         Path | None,
         typer.Option(
-            "--new-key", help="File with the new key, 32 random bytes in base64; -: stdin. Default: made here."
+            "--new-key",
+            help="Read the new key from this file, 32 random bytes in base64; -: stdin. Default: generate one.",
         ),
     ] = None,
     is_lost: Annotated[
         bool,
-        typer.Option(
-            "--lost", help="The old key is gone: sign with the present one, which every client has to be told of."
-        ),
+        typer.Option("--lost", help="The old key is lost: sign with the current one, which every client must be told."),
     ] = False,
     state: StateOption = DEFAULT_STATE,
     as_json: JsonOption = False,
@@ -140,13 +144,16 @@ def rotate_signing(
     from services.settings import Settings
 
     if is_lost and new_key is not None:
-        raise Problem("--lost takes the present key, and no --new-key.", "Put the new key in its place, then repeat.")
+        raise Problem(
+            "--lost uses the current key, so it cannot be combined with --new-key.",
+            "Put the new key in its place, then repeat.",
+        )
     seed = None
     if str(new_key) == "-":
         seed = decoded_seed(sys.stdin.read(), "Standard input")
     elif new_key is not None:
         if not new_key.is_file():
-            raise Problem(f"There is no file {new_key}.", "Make it: `openssl rand -base64 32 > new.key`.")
+            raise Problem(f"There is no file {new_key}.", "Create it: `openssl rand -base64 32 > new.key`.")
         seed = read_seed(new_key)
     settings = Settings(state=state)
     database = open_database(settings.database_url)
@@ -159,7 +166,7 @@ def rotate_signing(
         return
     print(done.public_key)
     say = output.err()
-    say.print(f"The registry's public key; {done.signed} versions are signed with it.", markup=False)
+    say.print(f"The registry's public key; it signs {counted(done.signed, 'versions')}.", markup=False)
     for reference in done.left:
         say.print(f"warning: {reference} had no right signature, and was left as it is.", markup=False)
     if settings.signing_key and not is_lost:

@@ -13,13 +13,13 @@ from services.cli.state import JsonOption
 
 
 def measurements(
-    scene: Annotated[str | None, typer.Option("--scene", help="Only those of this scene.")] = None,
-    technique: Annotated[str | None, typer.Option("--technique", help="Only those of this technique.")] = None,
-    budget: Annotated[float | None, typer.Option("--budget", help="Only those at this budget.")] = None,
-    model: Annotated[str | None, typer.Option("--model", help="Only those of this version, NAME@VERSION.")] = None,
-    job: Annotated[str | None, typer.Option("--job", help="Only those of this job.")] = None,
-    since: Annotated[str | None, typer.Option("--since", help="Only those from this time on, ISO 8601.")] = None,
-    until: Annotated[str | None, typer.Option("--until", help="Only those before this time, ISO 8601.")] = None,
+    scene: Annotated[str | None, typer.Option("--scene", help="List only those of this scene.")] = None,
+    technique: Annotated[str | None, typer.Option("--technique", help="List only those of this technique.")] = None,
+    budget: Annotated[float | None, typer.Option("--budget", help="List only those at this budget.")] = None,
+    model: Annotated[str | None, typer.Option("--model", help="List only those of this version, NAME@VERSION.")] = None,
+    job: Annotated[str | None, typer.Option("--job", help="List only those of this job.")] = None,
+    since: Annotated[str | None, typer.Option("--since", help="List only those from this time on, ISO 8601.")] = None,
+    until: Annotated[str | None, typer.Option("--until", help="List only those before this time, ISO 8601.")] = None,
     limit: LimitOption = 100,
     url: UrlOption = DEFAULT_URL,
     key_file: KeyFileOption = None,

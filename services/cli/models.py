@@ -23,10 +23,11 @@ if TYPE_CHECKING:
 app = typer.Typer(help="Published bundles: list, show, promote, roll back.", no_args_is_help=True)
 
 NameArgument = Annotated[str, typer.Argument(help="Name of the bundle.")]
-ReasonOption = Annotated[str, typer.Option("--reason", help="Why; kept in the history.")]
-AliasOption = Annotated[str, typer.Option("--alias", help="The alias that moves.")]
+ReasonOption = Annotated[str, typer.Option("--reason", help="State why; the history keeps it.")]
+AliasOption = Annotated[str, typer.Option("--alias", help="Move this alias.")]
 ServerOption = Annotated[
-    str | None, typer.Option("--url", envvar=URL_VARIABLE, help="A server's registry, not that of the state folder.")
+    str | None,
+    typer.Option("--url", envvar=URL_VARIABLE, help="Use this server's registry instead of the state folder's."),
 ]
 CHAMPION = "champion"
 
@@ -112,7 +113,7 @@ def show(
 @app.command()
 def promote(
     name: NameArgument,
-    version: Annotated[str, typer.Argument(help="Version that becomes the champion.")],
+    version: Annotated[str, typer.Argument(help="Version to make the champion.")],
     reason: ReasonOption,
     alias: AliasOption = CHAMPION,
     state: StateOption = DEFAULT_STATE,

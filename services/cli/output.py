@@ -35,6 +35,12 @@ def print_json(value: Any) -> None:
     sys.stdout.write("\n")
 
 
+def tell_new_folder(folder: Path) -> None:
+    """Says on stderr that a folder, which a result goes into, does not exist yet."""
+    if not folder.exists():
+        err().print(f"note: the folder {plain(folder)} does not exist; it will be made.", markup=False)
+
+
 def set_up_logging() -> None:
     """Warnings of the packages go to stderr, one line each."""
     handler = RichHandler(console=err(), show_time=False, show_path=False)

@@ -41,7 +41,7 @@ def pack(path: Path, name: str | None = None) -> Package:
     """
     if not path.is_file():
         what = f"{path} is a folder." if path.is_dir() else f"There is no file {path}."
-        raise Problem(what, "Name the file of the scene that is opened.", ExitCode.NOT_FOUND)
+        raise Problem(what, "Name the scene's root file.", ExitCode.NOT_FOUND)
     suffix = path.suffix.lower()
     if suffix not in (*_SINGLE, *_LAYERED):
         raise Problem(f"{path} is not a scene that can be uploaded.", f"Use {', '.join((*_LAYERED, *_SINGLE))}.")
@@ -63,7 +63,7 @@ def _dependencies(path: Path) -> tuple[set[Path], set[Path]]:
         from renderer.usd.digest import dependencies
     except ImportError as error:
         raise Problem(
-            f"What {path} consists of cannot be found out without OpenUSD.",
+            f"The files of {path} cannot be determined without OpenUSD.",
             "Install usd-core, or pack the scene into one .usdz file.",
         ) from error
     root = path.resolve()

@@ -9,6 +9,8 @@ import hashlib
 import json
 import math
 import os
+import shlex
+import stat
 import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -30,6 +32,7 @@ FINAL_STATES = ("cancelled", "succeeded", "failed")
 _HASHES_PER_REQUEST = 4000
 _LONGEST_EVENT = 1 << 20
 _LONGEST_POLL_SECONDS = 2.0
+_READ_BY_OTHERS = stat.S_IRGRP | stat.S_IROTH
 
 
 class Remote:
@@ -94,7 +97,7 @@ class Remote:
         # The part had arrived, and the answer was lost: the upload itself says where it is.
         state = self._json("GET", path)
         if int(state.get("received", offset)) == offset and not state.get("complete"):
-            raise Problem("The server does not take the next part of the upload.", "Run it again.", ExitCode.TRY_AGAIN)
+            raise Problem("The server refuses the next part of the upload.", "Run it again.", ExitCode.TRY_AGAIN)
         return state
 
     def upload_scene(self, package: Package, advance: Callable[[str, int], None] = lambda _name, _bytes: None) -> JSON:
@@ -113,18 +116,27 @@ class Remote:
         body = {"name": package.name, "root": package.root, "files": hashes}
         return self._json("POST", "/v1/scenes", json=body)
 
-    def wait_for_scene(self, scene_id: str, patience: float = 1800.0) -> JSON:
+    def wait_for_scene(
+        self, scene_id: str, patience: float = 1800.0, waiting: Callable[[float, JSON], None] = lambda *_: None
+    ) -> JSON:
         """The scene once it has been checked: accepted or rejected.
+
+        Args:
+            scene_id: Its id.
+            patience: Seconds at most.
+            waiting: Is told, now and then, for how many seconds the check has been waited for, and of which scene.
 
         Raises:
             Problem: It takes longer than `patience` seconds.
         """
-        end, wait = time.monotonic() + patience, 0.1
+        start, wait = time.monotonic(), 0.1
         while True:
             scene = self.scene(scene_id)
             if scene["state"] != "checking":
                 return scene
-            if time.monotonic() > end:
+            waited = time.monotonic() - start
+            waiting(waited, scene)
+            if waited > patience:
                 raise Problem(
                     f"The scene {scene_id} is still being checked.",
                     "Look at `diaphane workers`: is there one with the role render? Then run it again.",
@@ -291,24 +303,31 @@ def read_key(key_file: Path | None) -> str | None:
     """The API key: from a file, else from the environment; None if there is none.
 
     Raises:
-        Problem: The file cannot be read, or what is there cannot be a key.
+        Problem: The file cannot be read, others of this machine can read it, or what is there cannot be a key.
     """
-    source, text = f"The variable {KEY_VARIABLE}", os.environ.get(KEY_VARIABLE, "")
+    source, text, mode = f"The variable {KEY_VARIABLE}", os.environ.get(KEY_VARIABLE, ""), 0
     if key_file is not None:
         source = f"The file {key_file}"
         try:
+            mode = key_file.stat().st_mode
             text = key_file.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
-            raise Problem(f"{source} cannot be read.", "Check the path given to --key-file.", ExitCode.AUTH) from error
+            raise Problem(f"{source} cannot be read.", "Check the path of the key file.", ExitCode.AUTH) from error
     key = text.strip()
     if not (key.isascii() and key.isprintable()) or " " in key:
         raise Problem(f"{source} does not hold an API key.", "A key is one word: dia_...", ExitCode.AUTH)
+    if mode & _READ_BY_OTHERS:
+        raise Problem(
+            f"{source} can be read by other users of this machine.",
+            f"Keep it to yourself: `chmod 600 {shlex.quote(str(key_file))}`.",
+            ExitCode.AUTH,
+        )
     return key or None
 
 
-def open_remote(url: str, key_file: Path | None, **patience: float) -> Remote:
-    """The server at a URL, with the key of the file or the environment."""
-    return Remote(Transport(url, read_key(key_file), **patience))
+def open_remote(url: str, key: str | None, **patience: float) -> Remote:
+    """The server at a URL, asked with a key; None: without."""
+    return Remote(Transport(url, key, **patience))
 
 
 def server_sent(chunks: Iterator[bytes]) -> Iterator[JSON]:
@@ -352,7 +371,7 @@ def _segment(text: str) -> str:
         Problem: It is none.
     """
     if not text or text in (".", "..") or not all(c.isascii() and (c.isalnum() or c in "-._") for c in text):
-        raise Problem(f"'{text}' is no name or id.", "Copy it from the list of what there is.")
+        raise Problem(f"'{text}' is not a name or id.", "Copy it from the output of the list command.")
     return text
 
 

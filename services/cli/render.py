@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +11,7 @@ import typer
 
 from schemas.glass import DEFAULT_GLASS
 from services.cli import output
-from services.cli.lines import size
+from services.cli.lines import print_columns, size
 from services.cli.scene_options import (
     WHITE,
     AlphaOption,
@@ -28,13 +29,15 @@ from services.cli.technique_options import (
     BudgetOption,
     InferenceOption,
     NodesOption,
-    SamplesOption,
     SteepnessOption,
+    StochasticSamplesOption,
     TailOption,
     VkbOption,
 )
+from services.wording import counted
 
 if TYPE_CHECKING:
+    from services.ranking import Rank
     from services.rendering import Picture
 
 
@@ -63,9 +66,22 @@ def render(
     inference: InferenceOption = "glsl",
     vkb: VkbOption = "",
     nodes: NodesOption = None,
-    samples: SamplesOption = None,
+    stochastic_samples: StochasticSamplesOption = None,
+    samples: Annotated[
+        int,
+        typer.Option(
+            "--samples", help="Antialias by the mean, in linear light, of so many frames: 1, 2, 4, 8, 16, 32 or 64."
+        ),
+    ] = 1,
+    aov: Annotated[
+        list[str] | None,
+        typer.Option("--aov", help="Layers of the .exr beside the colours, of depth,n,k,alpha; repeatable."),
+    ] = None,
     compare: Annotated[
-        bool, typer.Option("--compare", help="Compare with the exact picture: MSE, PSNR, FLIP.")
+        bool,
+        typer.Option(
+            "--compare", help="Compare with the exact picture: MSE, PSNR, FLIP; several are ranked, on a contact sheet."
+        ),
     ] = False,
     camera: CameraOption = None,
     views: Annotated[
@@ -97,6 +113,7 @@ def render(
     from services.render_options import (
         RenderOptions,
         loading,
+        parse_aovs,
         parse_background,
         parse_needs,
         parse_techniques,
@@ -107,7 +124,7 @@ def render(
     options = RenderOptions(
         scenes=tuple(files),
         techniques=parse_techniques(techniques or (), bundle is not None),
-        needs=parse_needs(vkb, inference, nodes, samples),
+        needs=parse_needs(vkb, inference, nodes, stochastic_samples),
         budget=budget,
         tail=None if tail is None else parse_tail(tail),
         g=g,
@@ -119,11 +136,15 @@ def render(
         frames=parse_times(frames, default_time),
         load=loading(alpha, glass, variant, complexity, refine),
         background=parse_background(background),
+        samples=samples,
+        aovs=parse_aovs(aov or ()),
         output=target,
         is_full=is_full,
         compare=compare,
         state=state,
     )
+    if target is not None and not as_json:
+        output.tell_new_folder(target.parent)
     from services.rendering import render as run
 
     pictures, progress = [], make_progress(sys.stderr, silent=as_json)
@@ -133,8 +154,17 @@ def render(
             _show(picture)
     if note := said_left_out(techniques or (), bundle is not None):
         progress.note(note)
+    from services.ranking import ranked
+
+    ranks = ranked(pictures) if compare and len(options.techniques) > 1 else []
     if as_json:
-        output.print_json({"pictures": [picture.json() for picture in pictures]})
+        output.print_json(
+            {"pictures": [picture.json() for picture in pictures], "ranking": [rank.json() for rank in ranks]}
+        )
+    elif ranks:
+        _show_ranks(ranks)
+        for sheet in dict.fromkeys(picture.sheet for picture in pictures if picture.sheet is not None):
+            print(f"Contact sheet: {sheet}")
 
 
 def _show(picture: Picture) -> None:
@@ -146,17 +176,19 @@ def _show(picture: Picture) -> None:
         if picture.total_bytes is not None:
             print(f"  it would need {_memory(picture)}")
         return
-    pixels = picture.width * picture.height
+    drawn = picture.width * picture.height * picture.samples
     least, most = picture.k
     kept = f", {picture.captured:,} kept apart, k {least}..{most}"
-    print(f"  {picture.fragments:,} fragments, {(picture.fragments or 0) / pixels:.2f} a pixel{kept if most else ''}")
+    fragments = counted(picture.fragments or 0, "fragments")
+    print(f"  {fragments}, {(picture.fragments or 0) / drawn:.2f} per pixel{kept if most else ''}")
     if picture.family == "bounded":
-        print(f"  budget {picture.budget:,} fragments, {picture.tail} tail")
-    total = sum(picture.passes.values())
-    print(f"  {total:.1f} ms: {', '.join(f'{name} {ms:.1f}' for name, ms in picture.passes.items())}")
+        print(f"  budget {counted(picture.budget, 'fragments')}, {picture.tail} tail")
+    samples = f" for {picture.samples} samples per pixel" if picture.samples > 1 else ""
+    passes = ", ".join(f"{name} {ms:.1f}" for name, ms in picture.passes.items())
+    print(f"  {picture.milliseconds:.1f} ms{samples}: {passes}")
     print(f"  memory: {_memory(picture)}")
     if picture.skips:
-        print(f"  skipped: {', '.join(f'{count:,} {what}' for what, count in picture.skips.items())}")
+        print(f"  skipped: {', '.join(counted(count, what) for what, count in picture.skips.items())}")
     if picture.mse is not None:
         psnr = "no error" if picture.psnr is None else f"PSNR {picture.psnr:.2f} dB"
         print(f"  against exact: MSE {1e5 * picture.mse:.4g} x1e-5, {psnr}, FLIP {picture.flip:.4g}")
@@ -168,4 +200,32 @@ def _memory(picture: Picture) -> str:
     pool = f"pool {size(picture.pool_bytes or 0)}"
     if not picture.fits:
         pool += f" (it {said_unfit()})"
-    return f"{pool}, {picture.pixel_bytes} bytes a pixel beside it, {size(picture.total_bytes or 0)} at most"
+    beside = f"{counted(picture.pixel_bytes or 0, 'bytes')} per pixel beside it"
+    return f"{pool}, {beside}, {size(picture.total_bytes or 0)} at most"
+
+
+def _show_ranks(ranks: Sequence[Rank]) -> None:
+    from services.summary import full_title, number
+
+    asked = ranks[0].asked
+    over = f", means over {counted(asked, 'pictures')}" if asked > 1 else ""
+    print(f"\nRanked by error against the exact picture, then by time{over}")
+    print_columns(
+        ("rank", "technique", "family", "MSE e-5", "PSNR dB", "FLIP", "ms", "memory"),
+        [
+            [
+                place,
+                full_title(rank.technique),
+                rank.family,
+                None if rank.mse is None else number(1e5 * rank.mse),
+                None if rank.psnr is None else f"{rank.psnr:.2f}",
+                None if rank.flip is None else number(rank.flip),
+                "left out" if rank.milliseconds is None else f"{rank.milliseconds:.1f}",
+                None if rank.total_bytes is None else size(rank.total_bytes),
+            ]
+            for place, rank in enumerate(ranks, 1)
+        ],
+    )
+    for rank in ranks:
+        if 0 < rank.rendered < asked:
+            print(f"{rank.technique}: {rank.rendered} of {counted(asked, 'pictures')}; the others were left out")

@@ -35,18 +35,18 @@ def retrain(
     scenes: Annotated[list[str], typer.Argument(help="Scenes, files or ids, to train on.")],
     name: Annotated[str, typer.Option("--name", help="Name of the bundle in the registry.")],
     holdout: Annotated[
-        list[str], typer.Option("--holdout", help="Committed scene to evaluate on and never train on; repeatable.")
+        list[str], typer.Option("--holdout", help="Evaluate on this committed scene and never train on it; repeatable.")
     ],
     max_regression: Annotated[
-        float, typer.Option("--max-regression", help="Fraction by which an error may exceed the champion's.")
+        float, typer.Option("--max-regression", help="Allow errors to exceed the champion's by this fraction.")
     ] = 0.05,
     baseline: Annotated[str, typer.Option("--baseline", help="champion, or none: nothing is compared.")] = CHAMPION,
     start: Annotated[
         str,
-        typer.Option("--from", "--start-from", help="champion (the name's own), scratch, or NAME@ALIAS to begin with."),
+        typer.Option("--from", "--start-from", help="Start from champion (the name's own), scratch, or NAME@ALIAS."),
     ] = CHAMPION,
     is_promoted: Annotated[bool, typer.Option("--promote", help="Make it the champion if it is better.")] = False,
-    summary: Annotated[Path | None, typer.Option("--summary", help="File that the Markdown table goes to.")] = None,
+    summary: Annotated[Path | None, typer.Option("--summary", help="Write the Markdown table to this file.")] = None,
     licence: LicenceOption = None,
     views: ViewsOption = None,
     url: UrlOption = DEFAULT_URL,

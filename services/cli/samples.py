@@ -12,9 +12,9 @@ from services.cli.state import JsonOption
 
 
 def samples(
-    folder: Annotated[Path, typer.Argument(help="Where the USD files go; created if missing.")],
+    folder: Annotated[Path, typer.Argument(help="Folder for the USD files; created if missing.")],
     deep: Annotated[
-        bool, typer.Option("--deep", help="Write the deep scenes instead: 8 to 100 transparent fragments a pixel.")
+        bool, typer.Option("--deep", help="Write the deep scenes instead: 8 to 100 transparent fragments per pixel.")
     ] = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -22,6 +22,8 @@ def samples(
     from renderer.samples import SAMPLES, write_samples
     from renderer.samples.deep import DEEP
 
+    if not as_json:
+        output.tell_new_folder(folder.parent)
     paths = write_samples(folder, DEEP if deep else SAMPLES)
     if as_json:
         output.print_json({"scenes": [str(path) for path in paths]})

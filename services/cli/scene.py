@@ -21,6 +21,7 @@ from services.cli.scene_options import (
     VariantOption,
 )
 from services.cli.state import JsonOption
+from services.wording import counted
 
 if TYPE_CHECKING:
     from renderer.scene_report import SceneReport
@@ -75,6 +76,8 @@ def convert(
     """Convert OBJ, glTF, PLY and STL to USD: geometry, places, names, colours, opacity and textures."""
     from renderer.convert_meshes import convert_meshes
 
+    if not as_json:
+        output.tell_new_folder(target.parent)
     converted = convert_meshes(source, target, None if up is None else up.upper(), metres_per_unit)
     if as_json:
         output.print_json({**asdict(converted), "file": str(target)})
@@ -82,8 +85,9 @@ def convert(
     for warning in converted.warnings:
         output.err().print(f"warning: {warning}", markup=False)
     print(
-        f"{target}: {converted.triangles:,} triangles, {converted.meshes:,} meshes in {converted.instances:,} places, "
-        f"{converted.materials:,} materials, {converted.textures:,} textures, {converted.up} up, "
+        f"{target}: {counted(converted.triangles, 'triangles')}, {counted(converted.meshes, 'meshes')} in "
+        f"{counted(converted.instances, 'places')}, "
+        f"{counted(converted.materials, 'materials')}, {counted(converted.textures, 'textures')}, {converted.up} up, "
         f"{converted.metres_per_unit:g} m per unit"
     )
 
@@ -102,7 +106,8 @@ def _show(report: SceneReport) -> None:
 def _show_drawn(report: SceneReport) -> None:
     total = sum(report.triangles.values())
     kinds = ", ".join(f"{count:,} {kind}" for kind, count in report.triangles.items()) or "none"
-    print(f"{report.meshes:,} meshes in {report.instances:,} places, {total:,} triangles: {kinds}")
+    meshes = f"{counted(report.meshes, 'meshes')} in {counted(report.instances, 'places')}"
+    print(f"{meshes}, {counted(total, 'triangles')}: {kinds}")
     if report.bounds is not None:
         low, high = (" ".join(f"{x:g}" for x in corner) for corner in report.bounds)
         print(f"Bounds, metres: {low} to {high}")
@@ -129,7 +134,7 @@ def _show_materials(report: SceneReport) -> None:
     ]
     print_columns(("material", "kind", "triangles", "prims", "textured", "why"), rows)
     if unused:
-        print(f"{unused} more materials are bound to nothing that is drawn.")
+        print(f"Bound to nothing that is drawn: {counted(unused, 'more materials')}.")
     for name in report.textures:
         print(f"texture {plain(name)}")
 

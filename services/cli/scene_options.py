@@ -43,7 +43,7 @@ CameraOption = Annotated[
     typer.Option(
         "--camera",
         "-cam",
-        help="Name or path of a camera. Default: the render settings', main_cam, the first; or a view of it all.",
+        help="Name or path of a camera. Default: the render settings', main_cam, the first; else the whole scene.",
     ),
 ]
 WidthOption = Annotated[

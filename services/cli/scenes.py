@@ -22,7 +22,7 @@ app = typer.Typer(
 @app.command()
 def upload(
     files: Annotated[list[Path], typer.Argument(help="Scenes: .usd, .usda, .usdc, .usdz, .glb.")],
-    name: Annotated[str | None, typer.Option("--name", help="What the scene is called. Default: its file.")] = None,
+    name: Annotated[str | None, typer.Option("--name", help="Name of the scene. Default: that of its file.")] = None,
     wait: Annotated[bool, typer.Option("--wait/--no-wait", help="Wait until the server has checked them.")] = True,
     url: UrlOption = DEFAULT_URL,
     key_file: KeyFileOption = None,
@@ -35,12 +35,13 @@ def upload(
     from services.progress import make_progress
 
     if name is not None and len(files) > 1:
-        raise Problem("One name cannot be that of several scenes.", "Upload them one by one, or leave --name out.")
+        raise Problem("--name names one scene, and several were given.", "Upload them one by one, or leave --name out.")
     packages = [pack(path, name) for path in files]
     remote = connect(url, key_file)
-    scenes = inputs.upload(remote, packages, make_progress(sys.stderr, silent=as_json))
+    progress = make_progress(sys.stderr, silent=as_json)
+    scenes = inputs.upload(remote, packages, progress)
     if wait:
-        scenes = [remote.wait_for_scene(scene["id"]) for scene in scenes]
+        scenes = inputs.await_checks(remote, [scene["id"] for scene in scenes], progress)
     _show_all(scenes, as_json=as_json)
     for path, scene in zip(files, scenes, strict=True):
         inputs.ensure_accepted(scene, str(path))

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
+import socket
 import sys
 import threading
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from schemas.problem import ExitCode, Problem
+from services.cli.server import URL_VARIABLE
 from services.cli.state import DEFAULT_STATE, STATE_VARIABLE, StateOption
 
 if TYPE_CHECKING:
@@ -43,24 +45,24 @@ def serve(
 
     logs.set_up()
     settings = Settings()
+    check_port(host, port)  # before a key is made that is shown only once
     service = open_service(settings)
     show_first_key(service, host)
     runtime = Runtime(settings, wanted) if wanted else None  # with a store of its own, which waits longer
     stop = threading.Event()
     stop_on_signal(stop.set)
     listener = _Listener(service, host, port)
-    try:
+    with ExitStack() as stack:
+        stack.callback(listener.stop)
         listener.start()
         listener.wait_ready()  # before any work is claimed: it may be that it cannot listen
         if runtime is not None:
             runtime.start()
+            stack.callback(shut_down, runtime)
+            stack.callback(listener.stop)  # no more requests before the work ends
         announce(host, listener.port)
         while not stop.wait(0.5) and listener.is_alive():
             pass
-    finally:
-        listener.stop()
-        if runtime is not None:
-            shut_down(runtime)
     if not stop.is_set():
         raise Problem("The HTTP server ended by itself.", "Look into the log, and start it again.", ExitCode.TRY_AGAIN)
 
@@ -93,12 +95,7 @@ class _Listener(threading.Thread):
         """
         while not self._server.started:
             if not self.is_alive():
-                host, port = self._where
-                raise Problem(
-                    f"The service cannot listen on {host}, port {port}.",
-                    "Is another one running there? Choose another port with --port.",
-                    ExitCode.CONFLICT,
-                )
+                raise _not_listening(*self._where, "another program has taken it")
             time.sleep(0.02)
 
     def stop(self) -> None:
@@ -106,6 +103,33 @@ class _Listener(threading.Thread):
         self._server.should_exit = True
         if self.is_alive():
             self.join(self._drain_seconds + EXIT_SECONDS)
+
+
+def check_port(host: str, port: int) -> None:
+    """Makes sure that a server can listen.
+
+    Args:
+        host: Address to listen on.
+        port: The port; 0: a free one.
+
+    Raises:
+        Problem: It cannot.
+    """
+    try:
+        for family, kind, protocol, _, address in socket.getaddrinfo(host, port, type=socket.SOCK_STREAM):
+            with socket.socket(family, kind, protocol) as tried:
+                tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                tried.bind(address)
+    except OSError as error:
+        raise _not_listening(host, port, (error.strerror or str(error)).lower()) from error
+
+
+def _not_listening(host: str, port: int, cause: str) -> Problem:
+    return Problem(
+        f"Diaphane cannot listen on port {port} of {host}: {cause}.",
+        "Stop what listens there, or choose another one: --port 0 takes a free port.",
+        ExitCode.CONFLICT,
+    )
 
 
 def show_first_key(service: Service, host: str) -> None:
@@ -129,6 +153,13 @@ def show_first_key(service: Service, host: str) -> None:
 
 
 def announce(host: str, port: int) -> None:
-    """Prints where the service is."""
-    shown = f"[{host}]" if ":" in host else host
-    print(f"Diaphane serves http://{shown}:{port}", file=sys.stdout, flush=True)
+    """Prints where the service and its pages are, and how commands find it."""
+    shown = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host, f"[{host}]" if ":" in host else host)
+    url = f"http://{shown}:{port}"
+    lines = (
+        f"Diaphane serves http://{f'[{host}]' if ':' in host else host}:{port}",
+        f"Dashboard: {url}/",
+        f"API: {url}/v1, described by {url}/v1/openapi.json",
+        f"For the commands: export {URL_VARIABLE}={url}",
+    )
+    print("\n".join(lines), file=sys.stdout, flush=True)

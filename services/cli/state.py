@@ -14,5 +14,5 @@ StateOption = Annotated[
     Path, typer.Option("--state", envvar=STATE_VARIABLE, help="Folder of artifacts, registry and reports.")
 ]
 JsonOption = Annotated[
-    bool, typer.Option("--json", help="One JSON object on stdout; errors as one JSON object on stderr.")
+    bool, typer.Option("--json", help="Print one JSON object on stdout; errors as one JSON object on stderr.")
 ]

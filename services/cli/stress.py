@@ -17,16 +17,16 @@ from services.cli.state import JsonOption
 def stress(
     only: Annotated[
         list[str] | None,
-        typer.Option("--only", metavar="PATH", help="Only this fast path, such as predict; repeatable."),
+        typer.Option("--only", metavar="PATH", help="Run only this fast path, such as predict; repeatable."),
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer and smaller inputs.")] = False,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Of everything random.")] = 0,
+    quick: Annotated[bool, typer.Option("--quick", help="Use fewer and smaller inputs.")] = False,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of everything random.")] = 0,
     search: Annotated[
         float, typer.Option("--search", min=0.0, help="Seconds of each search for a worst case; 0 for none.")
     ] = 3.0,
     markdown: Annotated[
         Path | None,
-        typer.Option("--markdown", metavar="FILE", help="Also put the tables between their marks in this document."),
+        typer.Option("--markdown", metavar="FILE", help="Also write the tables between their marks in this document."),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:

@@ -17,22 +17,24 @@ from services.cli.state import JsonOption
 if TYPE_CHECKING:
     from services.cli.inputs import SceneInput
 
-ViewsOption = Annotated[Path | None, typer.Option("--views", help="JSON file with the views of local scenes.")]
+ViewsOption = Annotated[
+    Path | None, typer.Option("--views", help="Read the views of local scenes from this JSON file.")
+]
 
 
 def submit(
     kind: Annotated[str, typer.Argument(help="build, render, label, train or evaluate.")],
     scene: Annotated[
-        list[str] | None, typer.Option("--scene", help="Id, or file that is uploaded if it is new; repeatable.")
+        list[str] | None, typer.Option("--scene", help="Id of a scene, or a file, uploaded if it is new; repeatable.")
     ] = None,
     holdout: Annotated[
         list[str] | None,
-        typer.Option("--holdout", help="Scene to evaluate on and never train on; repeatable. Default: a quarter."),
+        typer.Option("--holdout", help="Evaluate on this scene and never train on it; repeatable. Default: a quarter."),
     ] = None,
     licence: LicenceOption = None,
     views: ViewsOption = None,
     idempotency_key: Annotated[
-        str | None, typer.Option("--idempotency-key", help="The same key with the same job finds that job.")
+        str | None, typer.Option("--idempotency-key", help="Resubmitting with this key returns the existing job.")
     ] = None,
     is_watched: Annotated[bool, typer.Option("--watch", help="Follow the job to its end.")] = False,
     url: UrlOption = DEFAULT_URL,

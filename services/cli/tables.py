@@ -2,7 +2,7 @@
 
     python -m services.cli.tables
 
-`tests/docs/test_option_tables.py` holds the files to it.
+`tests/docs/test_documents.py` holds the files to it.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from services.cli.retrain import OWN, VARIABLES
 from services.flags import Flag, flags
 
 ROOT = Path(__file__).resolve().parents[2]
-README = "README.md"
+DOCUMENT = "docs/CLI.md"
 ACTION = "deploy/retrain/action.yml"
 BEGIN, END = "options of the command", "end of options of the command"
 
@@ -64,7 +64,7 @@ def retrain_flags() -> list[Flag]:
 
 
 FILES: Mapping[str, tuple[Callable[[], str], ...]] = {
-    README: (build_table,),
+    DOCUMENT: (build_table,),
     ACTION: (action_inputs, action_environment),
 }
 """File -> what stands between its marks, in their order."""

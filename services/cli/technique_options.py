@@ -13,7 +13,7 @@ BudgetsOption = Annotated[
     str | None,
     typer.Option(
         "--budgets",
-        help="Fragments of a frame, as multiples of width x height: .5,1,2. Default: up to three quarters of what the "
+        help="Fragments per frame, as multiples of width x height: .5,1,2. Default: up to three quarters of what the "
         "views hold, from 0.05 to 4.",
     ),
 ]
@@ -23,12 +23,14 @@ TailOption = Annotated[
 SteepnessOption = Annotated[
     float | None,
     typer.Option(
-        "--g", help=f"Steepness of the density tail, with a bundle only beside a tail. Default: {DENSITY_G:g}."
+        "--g", help=f"Steepness of the density tail; with a bundle, name the tail as well. Default: {DENSITY_G:g}."
     ),
 ]
-InferenceOption = Annotated[str, typer.Option("--inference", help="How kbuffer-deep runs its network: glsl or onnx.")]
+InferenceOption = Annotated[str, typer.Option("--inference", help="Run the network of kbuffer-deep as glsl or onnx.")]
 VkbOption = Annotated[
     str, typer.Option("--vkb", help="For kbuffer-importance: thesis, no-depth, no-periphery, no-fresnel, no-noise.")
 ]
-NodesOption = Annotated[int | None, typer.Option("--nodes", help="Nodes a pixel of multilayer and adaptive.")]
-SamplesOption = Annotated[int | None, typer.Option("--samples", help="Samples a pixel of stochastic.")]
+NodesOption = Annotated[int | None, typer.Option("--nodes", help="Nodes per pixel of multilayer and adaptive.")]
+StochasticSamplesOption = Annotated[
+    int | None, typer.Option("--stochastic-samples", help="Depth samples per pixel of stochastic.")
+]

@@ -295,7 +295,7 @@ def _checked(url: str) -> str:
     except ValueError:
         good = False
     if not good or parts.query or parts.fragment:
-        raise Problem("The server's URL is not understood.", "Write it like --url http://127.0.0.1:8035.")
+        raise Problem("The server's URL is not valid.", "Write it like --url http://127.0.0.1:8035.")
     if parts.username is not None or parts.password is not None:
-        raise Problem("The server's URL carries a password.", "Put the key into DIAPHANE_KEY, not into the URL.")
+        raise Problem("The server's URL contains a password.", "Put the key into DIAPHANE_KEY, not into the URL.")
     return url.rstrip("/")

@@ -24,14 +24,14 @@ from services.cli.scene_options import (
     VariantOption,
     WidthOption,
 )
-from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption
+from services.cli.server import DEFAULT_URL, KeyFileOption, UrlOption, find_key
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
 from services.cli.technique_options import (
     BudgetOption,
     InferenceOption,
     NodesOption,
-    SamplesOption,
     SteepnessOption,
+    StochasticSamplesOption,
     TailOption,
     VkbOption,
 )
@@ -41,7 +41,9 @@ def view(
     file: SceneArgument,
     technique: Annotated[
         str | None,
-        typer.Option("--technique", "-t", help="On the left. Default: kbuffer-deep with a bundle, else kbuffer."),
+        typer.Option(
+            "--technique", "-t", help="Technique on the left. Default: kbuffer-deep with a bundle, else kbuffer."
+        ),
     ] = None,
     against: Annotated[str, typer.Option("--against", help="Technique on the right.")] = "sbuffer",
     layout: Annotated[
@@ -58,7 +60,7 @@ def view(
         str | None, typer.Option("--bundle", help="Instead: a folder, or NAME@ALIAS of the state folder's registry.")
     ] = None,
     watch: Annotated[
-        bool, typer.Option("--watch", help="Take every bundle that the alias of --model comes to mean.")
+        bool, typer.Option("--watch", help="Follow the alias of --model while the window is open.")
     ] = False,
     public_key: Annotated[
         str | None,
@@ -67,7 +69,7 @@ def view(
     inference: InferenceOption = "glsl",
     vkb: VkbOption = "",
     nodes: NodesOption = None,
-    samples: SamplesOption = None,
+    stochastic_samples: StochasticSamplesOption = None,
     camera: CameraOption = None,
     views: Annotated[Path | None, typer.Option("--views", help="JSON file with views of the scene.")] = None,
     view: Annotated[
@@ -76,7 +78,7 @@ def view(
     image_width: WidthOption = 960,
     picture_size: Annotated[
         str | None,
-        typer.Option("--size", help="WIDTHxHEIGHT of one picture, instead of --imageWidth; a window begins with it."),
+        typer.Option("--size", help="WIDTHxHEIGHT of one picture, instead of --imageWidth; a window starts with it."),
     ] = None,
     time: TimeOption = None,
     complexity: ComplexityOption = None,
@@ -86,15 +88,19 @@ def view(
     variant: VariantOption = None,
     background: BackgroundOption = WHITE,
     frames: Annotated[
-        int | None, typer.Option("--frames", help="No window: so many frames of a full turn; 1: the view itself.")
+        int | None,
+        typer.Option(
+            "--frames", help="Write this many frames of a full turn instead of opening a window; 1: the view itself."
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder of frames, pictures (key P) and statistics.csv (key C).")
     ] = None,
-    csv: Annotated[Path | None, typer.Option("--csv", help="File that rows of statistics are added to.")] = None,
-    flip: Annotated[bool, typer.Option("--flip", help="FLIP as well: it takes longer.")] = False,
+    csv: Annotated[Path | None, typer.Option("--csv", help="Append rows of statistics to this file.")] = None,
+    flip: Annotated[bool, typer.Option("--flip", help="Compute FLIP as well; it takes longer.")] = False,
     readout: Annotated[
-        bool | None, typer.Option("--readout/--no-readout", help="Numbers upon the picture. Default: in the window.")
+        bool | None,
+        typer.Option("--readout/--no-readout", help="Show the numbers on the picture. Default: in the window."),
     ] = None,
     state: StateOption = DEFAULT_STATE,
     url: UrlOption = DEFAULT_URL,
@@ -117,17 +123,23 @@ def view(
 
     check_bundle(model, "--model")
     if model is not None and bundle is not None:
-        raise Problem("Both --model and --bundle name a bundle.", "Leave one of them out.")
+        raise Problem("Both --model and --bundle name a bundle.", "Leave out one of them.")
     if watch and (model is None or frames is not None):
-        raise Problem("--watch follows the alias of --model in a window.", "Give --model, and no --frames.")
+        raise Problem(
+            "--watch follows the alias of --model in a window, so it needs --model and no --frames.",
+            "Add --model and leave out --frames, or leave out --watch.",
+        )
     if public_key is not None and model is None:
-        raise Problem("--public-key is that of the server of --model.", "Give --model, or leave it out.")
+        raise Problem(
+            "--public-key is the key of the server of --model, and there is no --model.",
+            "Add --model, or leave out --public-key.",
+        )
     has_bundle = model is not None or bundle is not None
     options = ViewerOptions(
         render=RenderOptions(
             scenes=(file,),
             techniques=parse_techniques([technique or ("kbuffer-deep" if has_bundle else "kbuffer")], has_bundle),
-            needs=parse_needs(vkb, inference, nodes, samples),
+            needs=parse_needs(vkb, inference, nodes, stochastic_samples),
             budget=budget,
             tail=None if tail is None else parse_tail(tail),
             g=g,
@@ -152,9 +164,9 @@ def view(
     )
     service = None
     if model is not None:
-        from services.cli.remote import read_key
-
-        service = Service(model, url, read_key(key_file), state, watch, public_key)
+        service = Service(model, url, find_key(url, key_file), state, watch, public_key)
+    if out is not None and not as_json:
+        output.tell_new_folder(out.parent)
     from services.viewer.run import view as run
 
     rows = run(options, service, make_progress(sys.stderr, silent=as_json))

@@ -61,7 +61,7 @@ def follow(remote: Remote, job_id: str, *, silent: bool = False, stream: TextIO 
             return job
     except KeyboardInterrupt:
         raise Problem(
-            f"Stopped watching; the job {job_id} goes on.",
+            f"Stopped watching; the job {job_id} continues.",
             f"Watch it again with: diaphane jobs watch {job_id}; stop it with: diaphane jobs cancel {job_id}",
             ExitCode.INTERRUPTED,
         ) from None
@@ -76,7 +76,7 @@ def ensure_success(job: dict[str, Any]) -> None:
     if job["state"] == "cancelled":
         raise Problem(
             f"The job {job['id']} was cancelled.",
-            f"Let it go on with: diaphane jobs retry {job['id']}",
+            f"Continue it with: diaphane jobs retry {job['id']}",
             ExitCode.INTERRUPTED,
         )
     if job["state"] == "failed":

@@ -23,7 +23,7 @@ EXIT_SECONDS = 20.0
 
 
 def worker(
-    roles: Annotated[str, typer.Option("--roles", help="What it does, of jobs,render,label,train.")],
+    roles: Annotated[str, typer.Option("--roles", help="Roles of the worker, of jobs,render,label,train.")],
     state: StateOption = DEFAULT_STATE,
 ) -> None:
     """Do the tasks of a service. Database and store are set by DIAPHANE_DATABASE and DIAPHANE_STORE."""

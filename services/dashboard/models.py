@@ -80,7 +80,7 @@ def show_model(
     registry = service.registry
     published = registry.versions(name)
     if not published:
-        raise Problem(f"There is no model '{name}'.", "Look at the list of models.", ExitCode.NOT_FOUND)
+        raise Problem(f"There is no model '{name}'.", "See the list of models.", ExitCode.NOT_FOUND)
     aliases = registry.aliases(name).aliases
     chosen = registry.resolve(f"{name}@{version or aliases.get(CHAMPION) or published[-1].version}")
     reference = f"{name}@{chosen.version}"

@@ -25,6 +25,7 @@ from services.engine import checks, events, progress, queues, states, system
 from services.engine.events import Event
 from services.settings import Settings
 from services.store import canonical_json
+from services.wording import counted
 
 if TYPE_CHECKING:
     from dbos import DBOSClient
@@ -407,7 +408,7 @@ def _require_place(connection: sa.Connection, submitted_by: str, most: int | Non
     mine = sa.and_(tables.jobs.c.submitted_by == submitted_by, tables.jobs.c.state.not_in(FINAL_STATES))
     if int(connection.scalar(sa.select(sa.func.count()).where(mine)) or 0) >= most:
         raise Problem(
-            f"The key has {most} jobs that have not ended, as many as it may.",
+            f"The key has {counted(most, 'jobs')} under way, as many as it may.",
             "Wait until some have ended, or cancel them.",
             ExitCode.LIMIT,
         )

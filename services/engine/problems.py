@@ -8,6 +8,7 @@ from typing import Final
 from schemas.problem import ExitCode, Problem
 from schemas.service import ProblemDocument
 from services.problems import document_of
+from services.wording import counted
 
 FINAL_CODES: Final = (
     ExitCode.USAGE,
@@ -90,7 +91,7 @@ def lost(count: int) -> ProblemDocument:
     """A task was under way on executors that were lost, each time."""
     return document_of(
         Problem(
-            f"{count} workers were lost while they were at it.",
+            f"Lost while at work on it: {counted(count, 'workers')}.",
             "It probably exhausts the memory of the machine: use a bigger one, or leave its scene or view out.",
             ExitCode.TRY_AGAIN,
         )

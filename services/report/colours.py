@@ -36,7 +36,12 @@ LEVELS = 256
 
 
 def apply(values: NDArray[np.floating], anchors: Anchors) -> NDArray[np.uint8]:
-    """Values in [0,1] (clamped; NaN is 0) of any shape to sRGB of that shape + [3], in 256 levels."""
+    """Values in [0,1] (clamped; NaN is 0) of any shape to sRGB of that shape + [3], in 256 levels.
+
+    Args:
+        values: Numbers of any shape; 0 is the first colour, 1 the last.
+        anchors: Colours of the map, in order.
+    """
     level = (np.clip(np.nan_to_num(values), 0.0, 1.0) * (LEVELS - 1) + 0.5).astype(np.uint8)
     return np.asarray(_table(anchors)[level])
 

@@ -89,13 +89,23 @@ def plates(sets: Iterable[PictureSet]) -> list[Plate]:
 
 
 def squared_error(image: NDArray[np.uint8], exact: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """float64 [H, W], mean over RGB of the squared difference of sRGB values in [0,1]."""
+    """float64 [H, W], mean over RGB of the squared difference of sRGB values in [0,1].
+
+    Args:
+        image: uint8 [H, W, 3], sRGB.
+        exact: uint8 [H, W, 3], sRGB, the picture it is compared with.
+    """
     difference = (image.astype(np.float64) - exact.astype(np.float64)) / 255.0
     return np.asarray(np.mean(difference * difference, axis=-1))
 
 
 def data_uri(image: NDArray[np.uint8], quality: int) -> str:
-    """A picture uint8 [H, W, 3] as a data URI (WebP, `quality` in percent)."""
+    """A picture uint8 [H, W, 3] as a data URI (WebP, `quality` in percent).
+
+    Args:
+        image: uint8 [H, W, 3], sRGB.
+        quality: Of the compression, percent.
+    """
     stream = io.BytesIO()
     Image.fromarray(image).save(stream, format="WEBP", quality=quality, method=2)
     return "data:image/webp;base64," + base64.b64encode(stream.getvalue()).decode("ascii")

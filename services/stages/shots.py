@@ -70,7 +70,11 @@ class Session:
         return display8(self.exact_linear)
 
     def simulate(self, k: NDArray[np.int32]) -> NDArray[np.float32]:
-        """The CPU's picture of an allocation, linear float32 [H, W, 3]."""
+        """The CPU's picture of an allocation, linear float32 [H, W, 3].
+
+        Args:
+            k: int32 [P], core fragments of each pixel.
+        """
         width, height = self.params.size
         return composite(self.dump, k, self.tail, self.g).reshape(height, width, 3)
 

@@ -70,7 +70,11 @@ def _allocated(name: str, dump: FragmentDump, curves: Curves) -> Iterator[Findin
 
 
 def edge_budgets(n: NDArray[np.integer]) -> list[int]:
-    """F in {0, occupied - 1, occupied, N - 1, N, 2N}, and half of N."""
+    """F in {0, occupied - 1, occupied, N - 1, N, 2N}, and half of N.
+
+    Args:
+        n: Integers [P], fragments of each pixel.
+    """
     occupied, total = int(np.count_nonzero(n)), int(n.sum())
     return sorted({max(0, f) for f in (0, occupied - 1, occupied, total // 2, total - 1, total, 2 * total)})
 

@@ -116,7 +116,11 @@ def bin_counts(rng: np.random.Generator, pixels: int, bins: int = 12) -> NDArray
 
 
 def whole_bins(counts: NDArray[np.uint8]) -> NDArray[np.int64]:
-    """int64 [P, B], fragments of bins that can be in a core, in plain Python; 0 from the first one that cannot."""
+    """int64 [P, B], fragments of bins that can be in a core, in plain Python; 0 from the first one that cannot.
+
+    Args:
+        counts: uint8 [P, B], fragments of each bin, 255 for that many or more.
+    """
     usable = np.zeros(counts.shape, np.int64)
     for row, out in zip(counts.tolist(), usable, strict=True):
         total = 0
@@ -159,7 +163,12 @@ def _order_of_bins(
 
 
 def exact_ranks(prices: Numbers, counts: NDArray[np.integer]) -> NDArray[np.float64]:
-    """`renderer.allocation.prices.ranks_of` before it is rounded down, in plain Python."""
+    """`renderer.allocation.prices.ranks_of` before it is rounded down, in plain Python.
+
+    Args:
+        prices: float64 [P, B], negated log gain per fragment.
+        counts: Integers [P, B], fragments of each bin.
+    """
     ranks = np.zeros(prices.shape)
     for row, own, out in zip(prices.tolist(), counts.tolist(), ranks, strict=True):
         most = 0.0

@@ -121,7 +121,13 @@ def _ranges(case: Case, driver: str) -> Finding:
 
 
 def counted_bins(case: Case, pixels: NDArray[np.integer], tail: TailName) -> NDArray[np.int64]:
-    """int64 [M, B], fragments of each depth bin of some pixels, in plain Python; 255 for that many or more."""
+    """int64 [M, B], fragments of each depth bin of some pixels, in plain Python; 255 for that many or more.
+
+    Args:
+        case: Input.
+        pixels: Integers [M], indices of pixels.
+        tail: A tail with depth bins.
+    """
     found = np.zeros((len(pixels), TAILS[tail].bins), np.int64)
     for row, p in zip(found, pixels.tolist(), strict=True):
         np.add.at(row, _depth_bins(case, p, tail).bin, 1)

@@ -114,14 +114,23 @@ class Geometry:
         return Hits(found.key[kept], found.depth[kept], sure[kept])
 
     def condition(self, key: NDArray[np.int64], depth: Floats) -> Floats:
-        """float64 [N], by how much each polygon amplifies roundings of its plane in the depth that is interpolated."""
+        """float64 [N], by how much each polygon amplifies roundings of its plane in the depth that is interpolated.
+
+        Args:
+            key: int64 [N], pixel x number of polygons + polygon of each hit.
+            depth: float64 [N], view-space distance of each hit, metres.
+        """
         pixel, polygon = np.divmod(key, len(self.corners))
         terms = self.normal[polygon] * self.rays[pixel]
         grazing = np.abs(terms).sum(axis=1) / np.maximum(np.abs(terms.sum(axis=1)), 1e-300)
         return np.asarray(grazing * np.maximum(np.abs(self.corners[polygon]).max(axis=(1, 2)) / depth, 1.0))
 
     def levels(self, key: NDArray[np.int64]) -> Floats:
-        """float64 [N, 3], what `common/surface.glsl` stores of each hit, in levels before they are rounded."""
+        """float64 [N, 3], what `common/surface.glsl` stores of each hit, in levels before they are rounded.
+
+        Args:
+            key: int64 [N], pixel x number of polygons + polygon of each hit.
+        """
         pixel, polygon = np.divmod(key, len(self.corners))
         eye = _unit(-self.rays[pixel])
         normal = self.normal[polygon]

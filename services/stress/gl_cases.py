@@ -128,7 +128,12 @@ def make_case(ctx: moderngl.Context, scenery: Scenery, programs: Programs) -> Ca
 
 
 def thinned(dump: FragmentDump, pixels: NDArray[np.integer]) -> FragmentDump:
-    """The same picture without the fragments of all other pixels: twins are slow."""
+    """The same picture without the fragments of all other pixels: twins are slow.
+
+    Args:
+        dump: A view.
+        pixels: Integers, indices of the pixels that keep their fragments.
+    """
     kept_pixel = np.zeros(dump.pixels, dtype=bool)
     kept_pixel[pixels] = True
     kept = np.repeat(kept_pixel, dump.counts)

@@ -49,7 +49,7 @@ class Suite:
         self._ctx, self._options, self._driver, self._say = ctx, options, driver, say
         self._programs = Programs(ctx)
         self._real = real_features(np.random.default_rng(options.seed), 500)
-        self._networks = networks(options.seed, self._real)
+        self._networks = networks(options.seed, self._real, small=options.quick)
 
     def rows(self) -> Iterator[Row]:
         """Rows of all cases together, then those of what needs no picture."""

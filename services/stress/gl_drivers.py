@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from renderer.context import is_software
+
 ROOT: Final = Path(__file__).parents[2]
 """Where the packages are."""
 
@@ -30,10 +32,9 @@ class Driver:
 
     def is_it(self, description: str) -> bool:
         """Whether a context is this driver's."""
-        text = description.lower()
         if self.begins:
-            return text.startswith(self.begins)
-        return not any(name in text for name in ("llvmpipe", "softpipe", "swrast", "swiftshader", "lavapipe"))
+            return description.lower().startswith(self.begins)
+        return not is_software(description)
 
 
 LLVMPIPE: Final = Driver(

@@ -74,13 +74,23 @@ class Truth:
     def in_order(
         self, twin: Callable[[NDArray[np.int64], NDArray[np.uint32], NDArray[np.float32], NDArray[np.uint8]], Floats]
     ) -> Floats:
-        """float64 [P, 3] of a twin that reads fragments in the order of submission; empty where not compared."""
+        """float64 [P, 3] of a twin that reads fragments in the order of submission; empty where not compared.
+
+        Args:
+            twin: Takes offsets int64 [P+1], packed colours uint32 [N], depths float32 [N] and backgrounds uint8 [P, 3],
+                and returns linear RGB float64 [P, 3].
+        """
         found, counts = self.ordered, self.dump.counts
         kept = np.repeat(counts > 0, np.diff(found.offsets))
         return twin(self.dump.offsets, found.packed[kept], found.depth[kept], self.dump.background)
 
     def hybrid(self, k: NDArray[np.integer], tail: TailName) -> Floats:
-        """float64 [P, 3], the pixels with k core fragments and a tail (METHOD.md section 2); NaN if not compared."""
+        """float64 [P, 3], the pixels with k core fragments and a tail (METHOD.md section 2); NaN if not compared.
+
+        Args:
+            k: Integers [P], core fragments of each pixel.
+            tail: How the others are approximated.
+        """
         made = np.full((self.dump.pixels, 3), np.nan)
         for p in self.case.pixels.tolist():
             made[p] = self._hybrid(p, int(k[p]), tail)

@@ -99,17 +99,19 @@ def real_features(rng: np.random.Generator, rows: int) -> Rows:
     return features[features.any(axis=1)][:rows]
 
 
-def networks(seed: int, real: Rows) -> dict[str, Weights]:
+def networks(seed: int, real: Rows, small: bool = False) -> dict[str, Weights]:
     """Networks with outputs of the size that trained ones have, normalised as training does.
 
     Args:
         seed: Of the weights.
         real: float32 [R, F], features whose mean and spread normalise the inputs.
+        small: With few units: a software driver compiles a network of the default size for many seconds.
     """
     from trainer.weights import Weights
 
     made = {}
-    for name, hidden, least in (("32-16", (32, 16), 1e-2), ("64-64-64, features of spread 1e-4", (64, 64, 64), 1e-4)):
+    for hidden, least in (((8, 6), 1e-2), ((12, 12, 12), 1e-4)) if small else (((32, 16), 1e-2), ((64, 64, 64), 1e-4)):
+        name = "-".join(map(str, hidden)) + ("" if least == 1e-2 else ", features of spread 1e-4")
         rng = np.random.default_rng(seed)
         layers = random_layers(rng, hidden, len(OUTPUTS))
         std = real.std(axis=0) if least == 1e-2 else np.full(len(FEATURES), least)

@@ -148,6 +148,9 @@ def features64(sums: NDArray[np.floating]) -> NDArray[np.float64]:
     """Features of raw sums in float64, [P, F], columns `renderer.features.FEATURES`; zero where n = 0.
 
     Written by hand from what the features are, not from `FORMULAS`.
+
+    Args:
+        sums: [P, S], raw sums of pixels, columns `renderer.features.SUMS`.
     """
     s = {name: sums[:, i].astype(np.float64) for i, name in enumerate(SUMS)}
     used = s["n"] > 0.5

@@ -77,7 +77,12 @@ def compose(layout: Layout, left: Pane, right: Pane, split: float, gain: float, 
 
 
 def difference(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """How far two pictures are apart: of each pixel the channel that differs most, [H, W] in [0,1], as displayed."""
+    """How far two pictures are apart: of each pixel the channel that differs most, [H, W] in [0,1], as displayed.
+
+    Args:
+        left: uint8 [H, W, 3], sRGB.
+        right: uint8 [H, W, 3], sRGB.
+    """
     apart = np.abs(left.astype(np.int16) - right.astype(np.int16)).max(axis=2)
     return np.asarray(apart / 255.0)
 

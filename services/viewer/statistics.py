@@ -61,7 +61,7 @@ def row(frame: int, side: str, shot: Shot, compared: Compared, bundle: str) -> R
         "mse_display": compared.mse_display,
         "psnr": compared.psnr,
         "flip": compared.flip,
-        **{f"{PASS}{name}": taken for name, taken in shot.recording.host.items()},
+        **{f"{PASS}{name}": taken for name, taken in shot.recording.passes.items()},
     }
 
 

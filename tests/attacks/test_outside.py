@@ -176,7 +176,7 @@ def test_no_process_opens_another_one_s_room_or_the_input_of_another_task(audite
 
 def test_check_and_job_agree_on_what_is_missing(audited: Audited) -> None:
     for name, scene in audited.done["scenes"].items():
-        found = [line for line in scene["facts"]["warnings"] if "files that are named" not in line]
+        found = [line for line in scene["facts"]["warnings"] if "not in the upload" not in line]
         told = [line for line in audited.done["warnings"][name] if not line.startswith("USD says")]
         assert not any(str(audited.folder) in line for line in audited.done["warnings"][name]), name
         assert [line for line in found if not line.startswith("USD found")] == told, name

@@ -246,10 +246,10 @@ def test_sums_of_luma_are_those_of_the_dump_to_the_unit(frame: Frame, dump: Frag
 @pytest.mark.parametrize("tail", BINNED_TAILS)
 @pytest.mark.parametrize("names", [FEATURES, NO_LUMA], ids=["all", "no luma"])
 def test_a_network_reads_what_the_dump_says(
-    frame: Frame, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, tail: TailName, names: tuple[str, ...]
+    frame: Frame, dump: FragmentDump, tmp_path: Path, tail: TailName, names: tuple[str, ...]
 ) -> None:
     network, features = random_weights(11, names, tail=tail), derive(gather(dump, tail))
-    export_random(tmp_path, network, features[dump.counts > 0], gl, tail)
+    export_random(tmp_path, network, features[dump.counts > 0], tail)
     deep, pixels = KBufferDeep(tmp_path), np.flatnonzero(dump.counts).astype(np.uint32)
     found, expected = deep.features(frame, pixels), features[pixels][:, network.columns]
     # The root of a difference makes up to 16 times what that is wrong by.

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-import moderngl
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -124,10 +123,10 @@ def spirv(path: Path, text: str, *options: str) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def compared(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Compared:
+def compared(tmp_path_factory: pytest.TempPathFactory) -> Compared:
     weights, features = WEIGHTS, real_features(100_000, 1)
     folder, work = tmp_path_factory.mktemp("bundle"), tmp_path_factory.mktemp("work")
-    export_random(folder, weights, features, gl)
+    export_random(folder, weights, features)
     text = {name: (folder / name).read_text() for name in (GLSL, GLSL_HALF, HLSL, UBO, UBO_HALF, WGSL, WGSL_HALF)}
     shaders = {name: webgpu.Shader(text[name] + webgpu.PREDICT, OUTPUTS) for name in (WGSL, WGSL_HALF)}
     shaders[HLSL] = webgpu.Shader(spirv(work / HLSL, text[HLSL] + HLSL_MAIN, "-D"), OUTPUTS)

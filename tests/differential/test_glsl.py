@@ -58,8 +58,8 @@ def compiled(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> 
         technique("sbuffer").render(Frame(GpuScene(gl, stack_scene(stacks)), STACKS, *size(len(stacks))), Budget(1))
         bundle = tmp_path_factory.mktemp("bundle")
         features = derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0]
-        export_random(bundle, random_weights(4), features, gl)
-        export_random(bundle / "importances", random_weights(4, head="importance"), features, gl)
+        export_random(bundle, random_weights(4), features)
+        export_random(bundle / "importances", random_weights(4, head="importance"), features)
         needs = Needs(bundle=bundle, allocate=lambda frame, _: np.minimum(frame.count(), 2).astype(np.int32))
         for folder in (bundle, bundle / "importances"):
             deep, listed = KBufferDeep(folder), np.flatnonzero(dump.counts).astype(np.uint32)

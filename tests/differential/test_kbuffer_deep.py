@@ -47,11 +47,10 @@ def bundle(
     network: Weights,
     dump: FragmentDump,
     features: NDArray[np.float32],
-    gl: moderngl.Context,
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Path:
     folder = tmp_path_factory.mktemp("bundle")
-    export_random(folder, network, features[dump.counts > 0], gl)
+    export_random(folder, network, features[dump.counts > 0])
     return folder
 
 
@@ -92,11 +91,9 @@ def test_answers_equal_those_of_the_numpy_network(
 
 
 @pytest.mark.parametrize("tail", BINNED_TAILS)
-def test_ranks_are_those_of_numpy(
-    frame: Frame, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, tail: TailName
-) -> None:
+def test_ranks_are_those_of_numpy(frame: Frame, dump: FragmentDump, tmp_path: Path, tail: TailName) -> None:
     network, features = random_weights(7, FEW, tail=tail), derive(gather(dump, tail))
-    export_random(tmp_path, network, features[dump.counts > 0], gl, tail)
+    export_random(tmp_path, network, features[dump.counts > 0], tail)
     ranks, counts = ranks_and_counts(KBufferDeep(tmp_path), frame)
     assert np.array_equal(counts, bin_counts(dump, tail)[:, : TAILS[tail].bins])
     prices = gain_prices(network.run(features), feature_prior(features, counts, TAILS[tail]))
@@ -115,12 +112,11 @@ def test_ranks_are_those_of_numpy(
 def test_cuts_are_those_of_numpy_and_the_picture_is_as_simulated(
     frame: Frame,
     dump: FragmentDump,
-    gl: moderngl.Context,
     tmp_path: Path,
     tail: TailName,
     share: float,
 ) -> None:
-    export_random(tmp_path, random_weights(7, FEW, tail=tail), derive(gather(dump, tail))[dump.counts > 0], gl, tail)
+    export_random(tmp_path, random_weights(7, FEW, tail=tail), derive(gather(dump, tail))[dump.counts > 0], tail)
     deep, fragments = KBufferDeep(tmp_path), int(share * dump.total)
     rendered = deep.render(frame, Budget(fragments, tail))
     assert np.array_equal(rendered.k, expected_k(deep, frame, fragments))
@@ -201,10 +197,10 @@ def test_a_bundle_renders_its_own_tail_alone(deep: KBufferDeep, frame: Frame, ot
 
 
 def test_importances_meet_the_budget_as_their_network_says(
-    tmp_path: Path, fresh: Frame, dump: FragmentDump, features: NDArray[np.float32], gl: moderngl.Context
+    tmp_path: Path, fresh: Frame, dump: FragmentDump, features: NDArray[np.float32]
 ) -> None:
     network = random_weights(5, FEW, (8,), "importance")
-    export_random(tmp_path, network, features[dump.counts > 0], gl)
+    export_random(tmp_path, network, features[dump.counts > 0])
     deep = KBufferDeep(tmp_path)
     pixels = np.flatnonzero(dump.counts).astype(np.uint32)
     expected = network.run(features[pixels])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import moderngl
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -50,10 +49,10 @@ class Given(KBufferDeep):
 
 
 @pytest.fixture(scope="module")
-def bundle(dump: FragmentDump, gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def bundle(dump: FragmentDump, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("bundle")
     network = random_weights(5, ("log_n", "front_2"), (8,), "importance")
-    export_random(folder, network, derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0], gl)
+    export_random(folder, network, derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0])
     return folder
 
 

@@ -46,9 +46,9 @@ def gpu(gl: moderngl.Context) -> GpuScene:
 
 
 @pytest.fixture(scope="module")
-def bundle(dump: FragmentDump, gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def bundle(dump: FragmentDump, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("bundle")
-    export_random(folder, random_weights(11), derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0], gl)
+    export_random(folder, random_weights(11), derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0])
     return folder
 
 
@@ -63,9 +63,9 @@ def fragments_of(dump: FragmentDump, share: float) -> int:
 
 @pytest.mark.parametrize("tail", BINNED_TAILS)
 def test_first_frame_is_that_of_kbuffer_deep_and_sees_what_last_fragments_change(
-    gpu: GpuScene, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path, tail: TailName
+    gpu: GpuScene, dump: FragmentDump, tmp_path: Path, tail: TailName
 ) -> None:
-    export_random(tmp_path, random_weights(11, tail=tail), derive(gather(dump, tail))[dump.counts > 0], gl, tail)
+    export_random(tmp_path, random_weights(11, tail=tail), derive(gather(dump, tail))[dump.counts > 0], tail)
     budget, temporal = Budget(fragments_of(dump, 0.3), tail), KBufferTemporal(tmp_path)
     first = temporal.render(Frame(gpu, VIEW, *SIZE, float_sums=True), budget)
     plain = KBufferDeep(tmp_path).render(Frame(gpu, VIEW, *SIZE, float_sums=True), budget)
@@ -219,10 +219,8 @@ def test_small_and_empty_pictures(gpu: GpuScene, bundle: Path, size: tuple[int, 
             assert np.isfinite(rendered.linear).all()
 
 
-def test_answers_that_are_no_numbers_stay_within_the_budget(
-    gpu: GpuScene, gl: moderngl.Context, dump: FragmentDump, tmp_path: Path
-) -> None:
-    export_overflowing(tmp_path, random_weights(3), derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0], gl)
+def test_answers_that_are_no_numbers_stay_within_the_budget(gpu: GpuScene, dump: FragmentDump, tmp_path: Path) -> None:
+    export_overflowing(tmp_path, random_weights(3), derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0])
     temporal = KBufferTemporal(tmp_path)
     for fragments in (0, int(np.count_nonzero(dump.counts)) - 1, dump.total // 3, dump.total - 1):
         for _ in range(2):
@@ -233,10 +231,10 @@ def test_answers_that_are_no_numbers_stay_within_the_budget(
 
 
 def test_without_prices_on_the_gpu_there_is_nothing_to_correct(
-    gpu: GpuScene, bundle: Path, dump: FragmentDump, gl: moderngl.Context, tmp_path: Path
+    gpu: GpuScene, bundle: Path, dump: FragmentDump, tmp_path: Path
 ) -> None:
     weights = random_weights(5, ("log_n",), (8,), "importance")
-    export_random(tmp_path, weights, derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0], gl)
+    export_random(tmp_path, weights, derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0])
     for temporal in (KBufferTemporal(tmp_path), KBufferTemporal(bundle, "onnx")):
         with pytest.raises(Problem, match="corrects prices of bins on the GPU") as caught:
             temporal.render(Frame(gpu, VIEW, *SMALL), Budget(1000))

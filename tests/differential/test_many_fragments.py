@@ -9,7 +9,7 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
-from support.training import random_weights
+from support.training import export_random, random_weights
 
 from labeller.curves import composite
 from renderer.allocation.cuts import FULL, MOST_CORE, usable_counts
@@ -20,11 +20,9 @@ from renderer.gpu_scene import GpuScene
 from renderer.reference import adaptive, multilayer
 from renderer.techniques import TECHNIQUES, Adaptive, Budget, Multilayer, Needs, Rendered, technique
 from renderer.techniques.ordered import capture_ordered
-from schemas.bundle import Provenance, TailSpec
 from schemas.fragments import FragmentDump
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, TAILS, TailName
 from services.stress.gl_stacks import STRIDE, VIEW, extreme_stacks, size, stack_scene
-from trainer.bundle import Description, export_bundle
 
 LAYERS = 4096
 FEWER_LAYERS = 96
@@ -62,23 +60,16 @@ def lower_case(gl: moderngl.Context) -> Case:
 
 
 @pytest.fixture(scope="module")
-def needs(case: Case, gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Needs:
+def needs(case: Case, tmp_path_factory: pytest.TempPathFactory) -> Needs:
     return Needs(
-        bundle=make_bundle(case.dump, gl, tmp_path_factory.mktemp("bundle")),
+        bundle=make_bundle(case.dump, tmp_path_factory.mktemp("bundle")),
         allocate=lambda frame, _: np.minimum(frame.count(), 5 + np.arange(frame.pixels) % 60).astype(np.int32),
     )
 
 
-def make_bundle(dump: FragmentDump, gl: moderngl.Context, folder: Path, tail: TailName = DEFAULT_TAIL) -> Path:
-    description = Description(
-        name="random",
-        tail=TailSpec(name=tail, g=0.75),
-        metric="display",
-        provenance=Provenance(scenes={}, code_version="0", seed=0, machine="test"),
-        evaluation={},
-    )
+def make_bundle(dump: FragmentDump, folder: Path, tail: TailName = DEFAULT_TAIL) -> Path:
     network = random_weights(11, FEATURES, (8,), tail=tail)
-    export_bundle(folder, network, description, derive(gather(dump, tail))[dump.counts > 0], gl)
+    export_random(folder, network, derive(gather(dump, tail))[dump.counts > 0], tail)
     return folder
 
 
@@ -125,7 +116,7 @@ def test_predicted_cores_are_bins_of_fewer_than_255_and_1023_in_all__name_tail_l
 ) -> None:
     """Thousands of fragments in every bin leave a pixel to its tail, and the picture is as simulated all the same."""
     case = make_case(gl, layers)
-    needs = Needs(bundle=make_bundle(case.dump, gl, tmp_path, tail))
+    needs = Needs(bundle=make_bundle(case.dump, tmp_path, tail))
     by_bin = case.frame.kept_bins(tail).counts()
     usable = usable_counts(by_bin)
     assert (by_bin == FULL).any() == (layers > FEWER_LAYERS)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import moderngl
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -21,11 +20,11 @@ from schemas.tail import DEFAULT_TAIL, TAILS
 
 
 @pytest.fixture(scope="module")
-def folder(dump: FragmentDump, gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(dump: FragmentDump, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("networks")
     features, network = features_of(dump)[dump.counts > 0], random_weights(3, FEATURES)
-    export_random(folder / "plain", network, features, gl)
-    export_overflowing(folder / "overflowing", network, features, gl)
+    export_random(folder / "plain", network, features)
+    export_overflowing(folder / "overflowing", network, features)
     return folder
 
 

@@ -45,7 +45,7 @@ def shared(gl: moderngl.Context) -> Programs:
 
 @pytest.fixture(scope="module")
 def made(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> gl_network.Networks:
-    weights = next(iter(networks(0, real_features(np.random.default_rng(0), 50)).values()))
+    weights = next(iter(networks(0, real_features(np.random.default_rng(0), 50), small=True).values()))
     return gl_network.random_networks(tmp_path_factory.mktemp("networks"), weights, "here")
 
 

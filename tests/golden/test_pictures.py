@@ -35,11 +35,11 @@ def frame(gl: moderngl.Context) -> Frame:
 
 
 @pytest.fixture(scope="module")
-def needs(frame: Frame, gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Needs:
+def needs(frame: Frame, tmp_path_factory: pytest.TempPathFactory) -> Needs:
     """A network of random weights, and an allocation that depends on nothing but the counts."""
     folder = tmp_path_factory.mktemp("bundle")
     dump = capture(frame).dump
-    export_random(folder, random_weights(11), derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0], gl)
+    export_random(folder, random_weights(11, hidden=(32, 16)), derive(gather(dump, DEFAULT_TAIL))[dump.counts > 0])
     return Needs(bundle=folder, allocate=lambda frame, _: (frame.count() // 2).astype(np.int32))
 
 

@@ -36,7 +36,7 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def options(
     samples: Path, state: Path, scenes: tuple[str, ...] = (*TRAIN, HELD_OUT), **changes: object
 ) -> BuildOptions:
-    usual = Options(budgets=(1.0, 2.0), width=176, height=118, views_per_scene=2, steps=200)
+    usual = Options(budgets=(1.0, 2.0), width=96, height=64, views_per_scene=2, network="tiny", steps=200)
     own = {name: changes.pop(name) for name in Options.model_fields.keys() & changes.keys()}
     settings: dict[str, object] = {
         "scenes": tuple(samples / name for name in scenes),
@@ -107,7 +107,7 @@ def test_the_data_set_can_be_copied_and_read_by_itself(built: BuildResult, state
     for entry, shard in trained:
         assert dataset.check(entry).segments == shard.segments > 0
         assert entry.source.camera.name == entry.source.view
-        assert (shard.meta.width, shard.meta.height) == (176, 118)
+        assert (shard.meta.width, shard.meta.height) == (96, 64)
 
 
 def test_a_shard_that_was_lost_is_there_again_after_the_same_command(
@@ -187,7 +187,7 @@ def test_an_opaque_scene_that_is_held_out_by_itself_is_not_scored(samples: Path,
     wanted = BuildOptions(
         scenes=(samples / TRAIN[0], solid),
         name="unscored",
-        options=Options(budgets=(1.0,), width=64, height=48, steps=20),
+        options=Options(budgets=(1.0,), width=64, height=48, network="tiny", steps=20),
         state=tmp_path / "state",
     )
     assert wanted.holdout == (solid,), "the automatic choice"
@@ -204,7 +204,7 @@ def test_an_opaque_scene_that_is_held_out_by_itself_is_not_scored(samples: Path,
 def test_opaque_scene_is_refused_with_the_way_out(tmp_path: Path) -> None:
     scene = tmp_path / "solid.usda"
     scene.write_text('#usda 1.0\n(defaultPrim = "C")\ndef Cube "C" {}\n', encoding="utf-8")
-    small = Options(width=64, height=48, steps=20)
+    small = Options(width=64, height=48, network="tiny", steps=20)
     wanted = BuildOptions(scenes=(scene,), name="solid", options=small, state=tmp_path / "state")
     with pytest.raises(Problem, match=r"solid.*--alpha 0\.33"):
         build(wanted, SilentProgress())
@@ -212,7 +212,7 @@ def test_opaque_scene_is_refused_with_the_way_out(tmp_path: Path) -> None:
         BuildOptions(
             scenes=(scene,),
             name="solid",
-            options=Options(budgets=(0.25,), alpha=0.33, width=64, height=48, steps=20),
+            options=Options(**{**small.model_dump(), "budgets": (0.25,), "alpha": 0.33}),
             state=tmp_path / "state",
         ),
         SilentProgress(),

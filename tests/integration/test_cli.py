@@ -29,6 +29,7 @@ from services.registry import open_registry
 from services.result import BuildResult
 from services.settings import Settings
 from services.storage import open_storage
+from services.versions import diaphane_version
 
 Build = Callable[[BuildOptions, Progress], BuildResult]
 
@@ -252,9 +253,39 @@ def test_an_unexpected_error_is_short_and_its_traceback_is_kept(
 
 
 def test_no_command_prints_the_help(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run([]) == ExitCode.USAGE
+    assert run([]) == ExitCode.OK
     captured = capsys.readouterr()
     assert "build" in captured.out + captured.err
+
+
+@pytest.mark.parametrize("arguments", [["-h"], ["build", "-h"], ["models", "show", "-h"], ["models"]])
+def test_help_is_asked_for_by_one_letter_and_is_no_failure(
+    arguments: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(arguments) == ExitCode.OK
+    captured = capsys.readouterr()
+    assert "Usage: diaphane" in captured.out + captured.err
+    assert "error" not in captured.err
+
+
+def test_the_version_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["--version"]) == ExitCode.OK
+    assert capsys.readouterr().out == f"diaphane {diaphane_version()}\n"
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"), [("bui", {"build"}), ("models sh", {"show"}), ("build --st", {"--state", "--steps"})]
+)
+def test_a_shell_completes_commands_and_options(
+    typed: str, offered: set[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("_DIAPHANE_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", f"diaphane {typed}")
+    monkeypatch.setenv("COMP_CWORD", str(len(typed.split())))
+    with pytest.raises(SystemExit) as end:
+        run([])
+    assert end.value.code == 0
+    assert set(capsys.readouterr().out.split()) == offered
 
 
 def test_version_names_the_libraries(capsys: pytest.CaptureFixture[str]) -> None:

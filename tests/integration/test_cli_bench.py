@@ -231,8 +231,9 @@ def test_the_suite_publishes_its_results_and_a_page(
     (lines,) = (folder / "results").glob("bench-*.jsonl")
     result = suite.read_lines(lines)
     assert {(view.scene, view.alpha) for view in result.views} == {("nested_shells", 0.33), ("nested_shells", None)}
-    assert [view.path_frames for view in result.views] == [PATH_FRAMES, 0]
-    assert all((folder / name).is_file() for name in [f"results/{lines.stem}-figure6-2.svg"])
+    assert [view.path_frames for view in result.views] == [0, PATH_FRAMES]
+    for setting in ("authored", "alpha0.33"):
+        assert (folder / "results" / f"{lines.stem}-figure6-{setting}-48x32-0.25.svg").is_file()
     assert str(folder) not in lines.read_text() + page
     # It goes on where it was: nothing is measured again.
     rows = (folder / "work" / suite.label() / ROWS).read_text()

@@ -18,6 +18,7 @@ from support.fake_server import KEY, PART_BYTES, FakeServer, Fault, fake_server
 
 import services
 from schemas.problem import ExitCode, Problem
+from services.cli import inputs
 from services.cli.app import run
 from services.cli.packing import pack
 from services.cli.remote import Remote, open_remote, server_sent
@@ -43,7 +44,7 @@ def server(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeServer
 
 
 def remote(server: FakeServer) -> Remote:
-    return open_remote(server.url, None)
+    return open_remote(server.url, KEY)
 
 
 def usdz(folder: Path, name: str = "glass.usdz", size: int = 2500) -> Path:
@@ -155,9 +156,9 @@ def test_a_rejected_scene_ends_with_the_reason(
     [
         (["scenes", "upload", "nowhere.usdz"], ExitCode.NOT_FOUND, "no file nowhere.usdz"),
         (["scenes", "upload", "notes.txt"], ExitCode.USAGE, "notes.txt is not a scene"),
-        (["scenes", "upload", "a.usdz", "copy/a.usdz", "--name", "c"], ExitCode.USAGE, "One name"),
+        (["scenes", "upload", "a.usdz", "copy/a.usdz", "--name", "c"], ExitCode.USAGE, "--name names one scene"),
         (["scenes", "show", "scn_1"], ExitCode.NOT_FOUND, "no scene scn_1"),
-        (["scenes", "show", "../jobs"], ExitCode.USAGE, "no name or id"),
+        (["scenes", "show", "../jobs"], ExitCode.USAGE, "not a name or id"),
         (["jobs", "show", "job_1"], ExitCode.NOT_FOUND, "no job job_1"),
         (["jobs", "submit", "build", "--scene", "a.usdz"], ExitCode.USAGE, "A build needs a name."),
         (["jobs", "submit", "bake", "--scene", "a.usdz"], ExitCode.USAGE, "kind"),
@@ -166,8 +167,8 @@ def test_a_rejected_scene_ends_with_the_reason(
         (["jobs", "submit", "render", "--scene", "a.usdz", "--scene", "copy/a.usdz"], ExitCode.USAGE, "the same scene"),
         (["keys", "create", "ci", "--scope", "root"], ExitCode.USAGE, "no scope 'root'"),
         (["models", "show", "glass@9.9.9"], ExitCode.NOT_FOUND, "no version or alias"),
-        (["jobs", "list", "--url", "ftp://x"], ExitCode.USAGE, "URL is not understood"),
-        (["jobs", "list", "--url", "http://me:pass@host"], ExitCode.USAGE, "carries a password"),
+        (["jobs", "list", "--url", "ftp://x"], ExitCode.USAGE, "URL is not valid"),
+        (["jobs", "list", "--url", "http://me:pass@host"], ExitCode.USAGE, "contains a password"),
         (["jobs", "list", "--key-file", "nowhere"], ExitCode.AUTH, "file nowhere cannot be read"),
         (["jobs", "list", "--key-file", "notes.txt"], ExitCode.AUTH, "does not hold an API key"),
     ],
@@ -274,6 +275,19 @@ def test_a_redirect_is_not_followed(server: FakeServer) -> None:
         assert other.asked == []
 
 
+def test_an_upload_says_that_the_check_still_runs(
+    server: FakeServer, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(inputs, "_FIRST_TOLD_SECONDS", 0.0)
+    server.checks = 2
+    usdz(folder)
+    assert run(["scenes", "upload", "glass.usdz"]) == ExitCode.OK
+    captured = capsys.readouterr()
+    assert "check scenes: 1" in captured.err
+    assert "glass is still being checked (0 s); `diaphane workers` shows the queue." in captured.err
+    assert "accepted" in captured.out
+
+
 def test_the_key_is_never_shown(
     server: FakeServer, folder: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -289,10 +303,15 @@ def test_the_key_is_never_shown(
     assert KEY not in captured.out + captured.err + caplog.text + repr(transport)
 
 
-def test_the_key_comes_from_a_file(server: FakeServer, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_key_comes_from_a_file_that_only_its_owner_reads(
+    server: FakeServer, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.delenv("DIAPHANE_KEY")
     assert run(["jobs", "list"]) == ExitCode.AUTH
     (folder / "key").write_text(f"{KEY}\n")
+    assert run(["jobs", "list", "--key-file", "key"]) == ExitCode.AUTH
+    assert "chmod 600 key" in capsys.readouterr().err
+    (folder / "key").chmod(0o600)
     assert run(["jobs", "list", "--key-file", "key"]) == ExitCode.OK
 
 
@@ -501,7 +520,7 @@ def test_an_interrupt_while_watching_leaves_the_job_alone(server: FakeServer, fo
     _, err = child.communicate(timeout=20)
     release.set()
     assert child.returncode == ExitCode.INTERRUPTED
-    assert f"the job {job_id} goes on" in err
+    assert f"the job {job_id} continues" in err
     assert server.count("POST", "/v1/jobs/.*/cancel") == 0
 
 

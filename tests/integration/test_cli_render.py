@@ -20,8 +20,8 @@ from renderer.deep_exr import read_deep_exr
 from renderer.dump import read_dump
 from renderer.exr import read_exr
 from renderer.frame import Frame
-from renderer.techniques import TECHNIQUES, Budget, Entry, Rendered, bands
-from schemas.colour import display8
+from renderer.techniques import TECHNIQUES, Budget, Entry, Needs, Rendered, bands
+from schemas.colour import display8, linear_to_srgb, srgb_to_linear
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 from services.cli.app import run
@@ -126,6 +126,130 @@ def test_every_technique_writes_a_file_of_its_own_and_says_what_it_cost(
     assert by_name["kbuffer"]["k"] == [0, 0]
 
 
+def test_a_comparison_ends_with_one_ranking_and_a_contact_sheet(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["render", "panes.usda", "-t", "kbuffer,sbuffer,weighted-average", "--compare", "--budget", "0.5"]
+    found = answer(capsys, *options, "-w", "48", "-o", "p.png")
+    errors = {picture["technique"]: picture["mse"] for picture in found["pictures"]}
+    ranks = [rank["technique"] for rank in found["ranking"]]
+    assert ranks == sorted(errors, key=lambda name: errors[name])
+    assert ranks[0] == "sbuffer"
+    assert {picture["sheet"] for picture in found["pictures"]} == {"p-sheet.png"}
+    height, width, _ = pixels(folder / "p-sheet.png").shape
+    assert width >= 3 * 48
+    assert height >= 2 * 32
+    assert run([*options, "-w", "48", "-f", "1,2", "-cam", "moving", "-o", "q.#.png"]) == ExitCode.OK
+    out = capsys.readouterr().out
+    table = out[out.index("Ranked by error") :].splitlines()
+    assert "means over 2 pictures" in table[0]
+    assert [line.split()[0] for line in table[2:5]] == ["1", "2", "3"]
+    assert "exact (S-buffer) (sbuffer)" in table[2]
+    assert table[5:] == ["Contact sheet: q-sheet.1.png", "Contact sheet: q-sheet.2.png"]
+
+
+def test_what_is_timed_is_not_the_first_frame(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[tuple[int, int]] = []
+
+    class Slow:
+        name = "moment"
+
+        def render(self, frame: Frame, budget: Budget) -> Rendered:
+            drawn.append((frame.width, frame.height))
+            made = TECHNIQUES["sbuffer"].make(Needs()).render(frame, budget)
+            return replace(made, passes={"first" if len(drawn) == 1 else "later": 1.0})
+
+    monkeypatch.setitem(cast(dict[str, Entry], TECHNIQUES), "moment", Entry("approximate", "slow", lambda _: Slow()))
+    found = answer(capsys, "render", "panes.usda", "-t", "moment", "-w", "30", "--samples", "2")["pictures"]
+    assert drawn == [(30, 20)] * 3
+    assert found[0]["passes"] == {"later": 2.0}
+
+
+def test_samples_are_resolved_in_linear_light(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Against the mean of 8x8 pixels of a larger picture, in linear light."""
+
+    def rendered(technique: str, size: str, *options: str) -> tuple[dict[str, Any], np.ndarray]:
+        common = ["--float", "--budget", "1", "--size", size, "-t", technique, "-o", "a.exr", "--background", "#000000"]
+        (found,) = answer(capsys, "render", "panes.usda", *common, *options)["pictures"]
+        return found, read_exr(folder / "a.exr").astype(np.float64)
+
+    fine = rendered("sbuffer", "424x344")[1].reshape(43, 8, 53, 8, 3)
+    exact, in_srgb = fine.mean(axis=(1, 3)), srgb_to_linear(linear_to_srgb(fine).mean(axis=(1, 3)))
+    for technique in ("sbuffer", "kbuffer"):
+        single, jagged = rendered(technique, "53x43")
+        found, smooth = rendered(technique, "53x43", "--samples", "16")
+        assert found["samples"] == 16
+        assert found["budget"] == 16 * single["budget"] == 16 * 53 * 43
+        assert found["total_bytes"] == pytest.approx(single["total_bytes"], rel=0.1)
+        assert found["fragments"] == pytest.approx(16 * single["fragments"], rel=0.05)
+        edges = np.abs(in_srgb - exact).max(axis=2) > 0.02
+        assert edges.sum() > 30
+        errors = [np.abs(each - exact)[edges].mean() for each in (smooth, jagged, in_srgb)]
+        assert errors[0] < 0.1 * min(errors[1:])
+
+
+def test_layers_of_an_exr_are_read_by_others(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The layers of `--aov` against the deep picture of the same view, by OpenEXR's own reader."""
+    layers = ["--aov", "depth,n", "--aov", "k,alpha"]
+    (found,) = answer(capsys, "render", "panes.usda", "-w", "60", *layers, "-o", "a.exr")["pictures"]
+    answer(capsys, "dump", "panes.usda", "-o", "deep.exr", "-w", "60")
+    with OpenEXR.File("a.exr", separate_channels=True) as file:
+        planes = {name: channel.pixels for name, channel in file.channels().items()}
+    with OpenEXR.File("deep.exr", separate_channels=True) as file:
+        deep = {name: channel.pixels for name, channel in file.channels().items()}
+    assert set(planes) == {"R", "G", "B", "depth.Z", "n.V", "k.V", "alpha.A"}
+    assert {planes[name].dtype for name in ("depth.Z", "n.V", "k.V", "alpha.A")} == {np.dtype(np.float32)}
+    assert planes["n.V"].sum() == found["fragments"] > 0
+    assert np.array_equal(planes["k.V"], planes["n.V"])
+    has_opaque = np.zeros(planes["n.V"].shape, dtype=bool)
+    for y, x in np.ndindex(planes["n.V"].shape):
+        samples = deep["A"][y, x]
+        if samples is None or len(samples) == 0:
+            assert (planes["alpha.A"][y, x], planes["depth.Z"][y, x]) == (0.0, np.inf)
+            continue
+        alphas = np.asarray(samples, dtype=np.float64)
+        has_opaque[y, x] = alphas[-1] == 1.0
+        assert planes["n.V"][y, x] == len(alphas) - has_opaque[y, x]
+        assert planes["alpha.A"][y, x] == pytest.approx(1.0 - np.prod(1.0 - alphas), abs=2e-3)  # half floats
+        assert planes["depth.Z"][y, x] == pytest.approx(deep["Z"][y, x][0], rel=1e-6)
+    assert 0 < has_opaque.sum() < has_opaque.size
+    (found,) = answer(capsys, "render", "panes.usda", "-w", "60", *layers, "--samples", "4", "-o", "b.exr")["pictures"]
+    with OpenEXR.File("b.exr", separate_channels=True) as file:
+        soft = file.channels()["alpha.A"].pixels
+        assert 4.0 * file.channels()["n.V"].pixels.sum() == pytest.approx(found["fragments"])
+    assert len(np.unique(soft)) > len(np.unique(planes["alpha.A"]))
+    assert run(["render", "panes.usda", "-w", "60", *layers, "-o", "a.png"]) == ExitCode.USAGE
+    assert "Name an EXR picture" in capsys.readouterr().err
+
+
+def test_a_scene_without_anything_transparent_is_said_to_have_none(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stage = Usd.Stage.CreateNew("solid.usda")
+    UsdGeom.Cube.Define(stage, "/Cube")
+    stage.Save()
+    assert run(["render", "solid.usda", "-w", "16"]) == ExitCode.OK
+    assert "nothing in it is transparent: --alpha 0.33 makes every surface so" in capsys.readouterr().err
+    assert run(["render", "solid.usda", "-w", "16", "--alpha", "0.33"]) == ExitCode.OK
+    assert run(["render", "panes.usda", "-w", "16"]) == ExitCode.OK
+    assert "nothing in it" not in capsys.readouterr().err
+
+
+def test_a_folder_that_is_made_on_the_way_is_said(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for command, name, is_said in (
+        ("render", "new/deep/a.png", True),
+        ("render", "new/deep/b.png", False),
+        ("render", "c.png", False),
+        ("dump", "new/dumps/d.exr", True),
+    ):
+        assert run([command, "panes.usda", "-w", "16", "-o", name]) == ExitCode.OK
+        told = f"the folder {Path(name).parent} does not exist; it will be made" in capsys.readouterr().err
+        assert told is is_said
+        assert (folder / name).is_file()
+
+
 def test_an_exact_technique_that_cannot_render_a_view_says_what_it_would_need(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -206,12 +330,10 @@ def test_several_scenes_and_listed_views_do_not_overwrite_each_other(
     assert "More than one picture" in capsys.readouterr().err
 
 
-def test_a_bundle_is_a_folder_or_a_name_in_the_registry(
-    folder: Path, gl: moderngl.Context, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_bundle_is_a_folder_or_a_name_in_the_registry(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = folder / "bundle"
     made.mkdir()
-    export_random(made, random_weights(3), real_features(64, 5), gl)
+    export_random(made, random_weights(3), real_features(64, 5))
     settings = Settings(state=folder / ".diaphane", database="", store="", cache="")
     database = open_database(settings.database_url)
     registry = open_registry(database, open_storage(settings).blobs, settings)
@@ -340,6 +462,10 @@ def test_a_model_is_converted_inspected_and_rendered(folder: Path, capsys: pytes
         (["render", "panes.usda", "-t", "kbuffer-deep"], ExitCode.USAGE),
         (["render", "panes.usda", "--size", "20000x20000"], ExitCode.USAGE),
         (["render", "panes.usda", "--budget", "1e-9"], ExitCode.USAGE),
+        (["render", "panes.usda", "--samples", "3"], ExitCode.USAGE),
+        (["render", "panes.usda", "-o", "a.exr", "--aov", "z"], ExitCode.USAGE),
+        (["render", "panes.usda", "--bundle", "/no/such/folder"], ExitCode.NOT_FOUND),
+        (["render", "panes.usda", "--bundle", "panes.usda"], ExitCode.USAGE),
         (["render", "panes.usda", "-t", "multilayer", "--nodes", "0"], ExitCode.USAGE),
         (["dump", "panes.usda"], ExitCode.USAGE),
         (["dump", "missing.exr", "-o", "d"], ExitCode.NOT_FOUND),

@@ -45,11 +45,11 @@ def scene(tmp_path_factory: pytest.TempPathFactory, gl: moderngl.Context) -> Pat
 
 
 @pytest.fixture(scope="module")
-def bundles(tmp_path_factory: pytest.TempPathFactory, gl: moderngl.Context) -> list[Path]:
+def bundles(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     folders = []
     for seed in (3, 4):
         folders.append(tmp_path_factory.mktemp("bundle"))
-        export_random(folders[-1], random_weights(seed), real_features(64, 5), gl)
+        export_random(folders[-1], random_weights(seed), real_features(64, 5))
     return folders
 
 

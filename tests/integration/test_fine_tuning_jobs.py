@@ -65,7 +65,7 @@ def test_a_job_replays_what_its_beginning_was_trained_on_and_the_next_one_both(a
     version = arena.service.registry.record(arena.service.registry.resolve("tuned"))
     assert set(version.provenance["scenes"]) == {"glass", "scene of tuned"}
     texts = [event.data["text"] for event in arena.service.jobs.events(job.id) if event.kind == "log"]
-    assert any("begins with base@1.0.0" in text for text in texts)
+    assert any("starts from base@1.0.0" in text for text in texts)
 
     answer = arena.post(wanted(arena, "further", start_from="tuned"))
     (job,) = arena.wait(answer.json()["id"])

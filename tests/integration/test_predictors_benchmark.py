@@ -10,7 +10,8 @@ import moderngl
 import pytest
 
 from benchmarks import predictors
-from benchmarks.predicting import training
+from benchmarks.casting.cases import sample_cases
+from benchmarks.predicting import training, views
 from benchmarks.predicting.labels import OPTIMUM
 from benchmarks.predicting.variants import Variant
 from schemas.network import NetworkSize
@@ -38,11 +39,12 @@ def folder(gl: moderngl.Context, tmp_path_factory: pytest.TempPathFactory) -> Pa
 @pytest.fixture(autouse=True)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(predictors, "variants", lambda: FEW)
+    monkeypatch.setattr(views, "sample_cases", lambda folder: sample_cases(folder)[:6])
 
 
 def _arguments(folder: Path, *more: str) -> list[str]:
     outputs = ["--out", str(folder / "p.json"), "--page", str(folder / "P.md")]
-    return ["--work", str(folder), "--size", "48x36", "--views", "1", "--folds", "2", *outputs, *more]
+    return ["--work", str(folder), "--size", "32x24", "--views", "1", "--folds", "2", *outputs, *more]
 
 
 def test_it_runs_and_does_nothing_twice(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

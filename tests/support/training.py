@@ -7,7 +7,6 @@ from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
-import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +21,7 @@ from schemas.bundle import (
     MANIFEST,
     FeatureSpec,
     HeadName,
+    ParityReport,
     Provenance,
     TailSpec,
     file_spec,
@@ -32,10 +32,11 @@ from schemas.bundle import (
 from schemas.tail import DEFAULT_TAIL, TAILS, TailName
 from support.bundles import make_bundle
 from support.dumps import random_dump
-from trainer.bundle import Description, export_bundle
+from trainer.bundle import Description, write_bundle
 from trainer.dataset import ViewData, make_view
 from trainer.export_shader import shader_source
 from trainer.paper import with_paper_inputs
+from trainer.prune import pruned
 from trainer.weights import Layer, Weights
 
 
@@ -73,11 +74,14 @@ def random_paper_view(asset: str, seed: int, size: int = 40, max_n: int = 12) ->
 def random_weights(
     seed: int,
     features: tuple[str, ...] = FEATURES,
-    hidden: tuple[int, ...] = (32, 16),
+    hidden: tuple[int, ...] = (8, 6),
     head: HeadName = "bin-gains",
     tail: TailName = DEFAULT_TAIL,
 ) -> Weights:
-    """A network whose outputs have the size that trained ones have."""
+    """A network whose outputs have the size that trained ones have.
+
+    It is small: a software driver compiles a network of the default size for many seconds.
+    """
     rng = np.random.default_rng(seed)
     outputs = gain_outputs(TAILS[tail].bins) if head == "bin-gains" else HEADS[head][0]
     sizes = (len(features), *hidden, len(outputs))
@@ -95,10 +99,8 @@ def random_weights(
     return Weights(features, mean, std, tuple(layers), head, outputs)
 
 
-def export_random(
-    folder: Path, network: Weights, features: NDArray[np.float32], gl: moderngl.Context, tail: TailName = DEFAULT_TAIL
-) -> None:
-    """A bundle of a network in a folder, its forms compared on these features."""
+def export_random(folder: Path, network: Weights, features: NDArray[np.float32], tail: TailName = DEFAULT_TAIL) -> None:
+    """A bundle of a network in a folder; its forms are not compared, for which all of them would be compiled."""
     description = Description(
         name="random",
         tail=TailSpec(name=tail, g=0.75),
@@ -106,7 +108,8 @@ def export_random(
         provenance=Provenance(scenes={}, code_version="0", seed=0, machine="test"),
         evaluation={},
     )
-    export_bundle(folder, network, description, features, gl)
+    parity = ParityReport(count=1, tolerance=1e-5, torch_onnx=0.0, torch_glsl=0.0, torch_ubo=0.0, driver="none")
+    write_bundle(folder, pruned(network), description, features, lambda: parity)
 
 
 def write_unproven(folder: Path, network: Weights) -> Path:
@@ -123,9 +126,9 @@ def write_unproven(folder: Path, network: Weights) -> Path:
     return folder
 
 
-def export_overflowing(folder: Path, network: Weights, features: NDArray[np.float32], gl: moderngl.Context) -> None:
+def export_overflowing(folder: Path, network: Weights, features: NDArray[np.float32]) -> None:
     """A bundle of a network whose shader has sums that overflow: it answers infinity of either sign, and NaN."""
-    export_random(folder, network, features, gl)
+    export_random(folder, network, features)
     manifest = load_manifest(folder)
     weight, bias = network.layers[-1]
     largest = np.copysign(np.float32(3e38), weight)

@@ -2,6 +2,17 @@
 #include "common/bin_words.glsl"
 const int FOURS = BINS / 4;
 
+// `STEP(bin)` for every bin, in their order, written out: an array that is indexed by a loop's counter lies in memory
+// where a driver does not unroll the loop, which costs more than the network.
+#define FOUR_STEPS(STEP, bin) STEP(bin) STEP(bin + 1) STEP(bin + 2) STEP(bin + 3)
+#if BINS == 8
+#define EACH_BIN(STEP) FOUR_STEPS(STEP, 0) FOUR_STEPS(STEP, 4)
+#elif BINS == 12
+#define EACH_BIN(STEP) FOUR_STEPS(STEP, 0) FOUR_STEPS(STEP, 4) FOUR_STEPS(STEP, 8)
+#else
+#define EACH_BIN(STEP) FOUR_STEPS(STEP, 0) FOUR_STEPS(STEP, 4) FOUR_STEPS(STEP, 8) FOUR_STEPS(STEP, 12)
+#endif
+
 // A number of 8 bits for each.
 struct PixelBins {
     uint word[FOURS];

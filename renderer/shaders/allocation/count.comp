@@ -7,17 +7,19 @@ layout(local_size_x = 256) in;
 uniform uint pixels;
 shared uint own_counted[RANKS];
 
+void add_event(inout uint before, inout bool is_open, uint own, uint found) {
+    is_open = is_open && fits(own, before);
+    if (is_open && own > 0u) atomicAdd(own_counted[found], own);
+    before += own;
+}
+
 void add_events(uint p) {
     PixelBins bins = bins_of(p);
     PixelBins ranks = ranks_of(p);
     uint before = 0u;
     bool is_open = true;
-    for (int bin = 0; bin < BINS; ++bin) {
-        uint own = of_bin(bins, bin);
-        is_open = is_open && fits(own, before);
-        if (is_open && own > 0u) atomicAdd(own_counted[of_bin(ranks, bin)], own);
-        before += own;
-    }
+#define EVENT(bin) add_event(before, is_open, of_bin(bins, bin), of_bin(ranks, bin));
+    EACH_BIN(EVENT)
 }
 
 void main() {

@@ -4,27 +4,28 @@ struct Cut {
     uint more_bins, more_fragments;  // with those that come at the rank itself
 };
 
+void grant(inout Cut cut, inout uint before, inout bool is_open, uint own, uint found, int bin) {
+    is_open = is_open && fits(own, before);
+    before += own;
+    bool counts = is_open && own > 0u;
+    if (counts && (complete == 1u || found <= rank)) {
+        cut.more_bins = uint(bin) + 1u;
+        cut.more_fragments = before;
+    }
+    if (counts && (complete == 1u || found < rank)) {
+        cut.bins = uint(bin) + 1u;
+        cut.fragments = before;
+    }
+}
+
 Cut cut_of(uint p) {
     Cut cut = Cut(0u, 0u, 0u, 0u);
     PixelBins bins = bins_of(p);
     PixelBins ranks = ranks_of(p);
     uint before = 0u;
     bool is_open = true;
-    for (int bin = 0; bin < BINS; ++bin) {
-        uint own = of_bin(bins, bin);
-        is_open = is_open && fits(own, before);
-        uint found = of_bin(ranks, bin);
-        before += own;
-        if (!is_open || own == 0u) continue;
-        if (complete == 1u || found <= rank) {
-            cut.more_bins = uint(bin) + 1u;
-            cut.more_fragments = before;
-        }
-        if (complete == 1u || found < rank) {
-            cut.bins = uint(bin) + 1u;
-            cut.fragments = before;
-        }
-    }
+#define GRANT(bin) grant(cut, before, is_open, of_bin(bins, bin), of_bin(ranks, bin), bin);
+    EACH_BIN(GRANT)
     return cut;
 }
 

@@ -9,6 +9,23 @@ layout(local_size_x = 64) in;
 
 uniform uint pixels;
 
+#if OUTPUTS == 1
+void put_scale(inout Ranks ranks, inout float before, float weight, uint n, int bin) {
+    put_rank(ranks, bin, n, 2.0 * log((before + 0.5 * float(n) + 0.5) / weight));
+    before += float(n);
+}
+#else
+void put_price(
+    inout Ranks ranks, inout float before, DiaphaneAnswer answer, PixelBins bins, uint p, float optical_depth, int bin
+) {
+    uint n = of_bin(bins, bin);
+    float behind = optical_depth * (bin == BINS - 1 ? 1.0 : share_behind(kept_word(p, bin)));
+    float prior = prior_gain(max(n, 1u), max(behind - before, 0.0), before, optical_depth);
+    put_rank(ranks, bin, n, -(answer.y[bin] + answer.y[BINS] * prior));
+    before = behind;
+}
+#endif
+
 void main() {
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     uint p = 64u * group + gl_LocalInvocationIndex;
@@ -25,20 +42,12 @@ void main() {
 #if OUTPUTS == 1
     float weight = answer.y[0] > float(LEAST_IMPORTANCE) ? answer.y[0] : float(LEAST_IMPORTANCE);  // NaN is not
     float before = 0.0;
-    for (int bin = 0; bin < BINS; ++bin) {
-        uint n = of_bin(bins, bin);
-        put_rank(ranks, bin, n, 2.0 * log((before + 0.5 * float(n) + 0.5) / weight));
-        before += float(n);
-    }
+#define PRICE(bin) put_scale(ranks, before, weight, of_bin(bins, bin), bin);
+    EACH_BIN(PRICE)
 #else
     float optical_depth = optical_depth_in(p), before = 0.0;
-    for (int bin = 0; bin < BINS; ++bin) {
-        uint n = of_bin(bins, bin);
-        float behind = optical_depth * (bin == BINS - 1 ? 1.0 : share_behind(kept_word(p, bin)));
-        float prior = prior_gain(max(n, 1u), max(behind - before, 0.0), before, optical_depth);
-        put_rank(ranks, bin, n, -(answer.y[bin] + answer.y[BINS] * prior));
-        before = behind;
-    }
+#define PRICE(bin) put_price(ranks, before, answer, bins, p, optical_depth, bin);
+    EACH_BIN(PRICE)
 #endif
     for (int i = 0; i < FOURS; ++i) bin_word[ranks_at(i, p)] = ranks.word[i];
 }

@@ -18,6 +18,7 @@ from services.stages.allocations import write_allocations
 from services.stages.desk import SHARD, Desk
 from services.stages.label import Certified, LabelFacts, LabelParams, Shard
 from services.tasks import Report, Task
+from services.wording import counted
 
 Answer = TypeVar("Answer")
 
@@ -27,15 +28,15 @@ def make(desk: Desk, task: Task, params: LabelParams, folder: Path, report: Repo
     dump = read_dump(desk.artifact(task, "render"))
     curves = error_curves(dump, params.tail, params.g, params.metric)
     hulls = lower_hulls(curves)
-    report(0.3, f"curves of {dump.total:,} fragments")
+    report(0.3, f"curves of {counted(dump.total, 'fragments')}")
     budgets = needed_budgets(params.budgets, dump.total)
     made = {rule: allocate_curves(dump, curves, budgets, rule, hulls=hulls) for rule in RULES}
     write_allocations(folder, made)
     report(0.8, f"{len(RULES)} rules at {len(budgets)} budgets")
     if params.weights == "flip":
         # What is compared with other rules is not weighted; what is learned is.
-        counted = flip_weights(dump, [found.k for found in made["optimal"]], params.tail, params.g)
-        curves = error_curves(dump, params.tail, params.g, params.metric, counted)
+        weights = flip_weights(dump, [found.k for found in made["optimal"]], params.tail, params.g)
+        curves = error_curves(dump, params.tail, params.g, params.metric, weights)
     cuts = whole_bins(dump, curves)
     written = write_shard(
         folder / SHARD, dump, cuts, lower_hulls(cuts), budgets, seed=params.seed, weights=params.weights

@@ -10,12 +10,13 @@ from services.stages.desk import Desk
 from services.stages.pictured import Pictured
 from services.stages.render import RenderFacts
 from services.tasks import Report, Task
+from services.wording import counted
 
 
 def make(desk: Desk, task: Task, params: Pictured, folder: Path, report: Report) -> RenderFacts:
     """Writes the dump."""
     captured = capture(desk.frame(task, params))
-    report(0.5, f"{captured.dump.total:,} fragments")
+    report(0.5, counted(captured.dump.total, "fragments"))
     write_dump(folder, captured.dump)
     occupied = int((captured.dump.counts > 0).sum())
     return RenderFacts(total=captured.dump.total, occupied=occupied, passes=captured.passes)

@@ -10,6 +10,7 @@ from services.stages.desk import Desk
 from services.stages.scene import SceneFacts, SceneParams
 from services.store import file_sha256
 from services.tasks import Report, Task
+from services.wording import counted
 
 
 def make(desk: Desk, task: Task, params: SceneParams, folder: Path, report: Report) -> SceneFacts:
@@ -20,7 +21,7 @@ def make(desk: Desk, task: Task, params: SceneParams, folder: Path, report: Repo
     """
     scene = desk.scene(task, params)
     views = placed_views(params.views, scene) or scene_views(scene, params.count, params.seed)
-    report(1.0, f"{scene.triangles:,} triangles, {len(views)} views")
+    report(1.0, f"{counted(scene.triangles, 'triangles')}, {counted(len(views), 'views')}")
     return SceneFacts(
         views=tuple(views),
         triangles=scene.triangles,

@@ -9,6 +9,8 @@ import pytest
 
 from renderer.samples import SAMPLES, write_samples
 from renderer.scene import load_scene
+from renderer.usd.licence import authored_licence
+from schemas.licence import commercial_use
 from schemas.scene import SceneArrays
 
 
@@ -34,6 +36,11 @@ def test_bytes_are_the_same_every_time(folder: Path, tmp_path: Path) -> None:
 def test_files_are_small(folder: Path) -> None:
     sizes = {p.name: p.stat().st_size for p in folder.rglob("*.*")}
     assert max(sizes.values()) < 2_000_000, sizes
+
+
+def test_every_scene_states_a_licence_that_allows_commercial_use(folder: Path) -> None:
+    stages = sorted(folder.glob("*.usd?"))
+    assert {file.stem: commercial_use(authored_licence(file)) for file in stages} == dict.fromkeys(SAMPLES, "allowed")
 
 
 def test_every_scene_is_transparent_has_cameras_and_loads_without_warnings(scenes: dict[str, SceneArrays]) -> None:

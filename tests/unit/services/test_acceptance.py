@@ -93,7 +93,7 @@ def home(tmp_path: Path, database_url: str) -> Iterator[Home]:
 def test_an_alias_becomes_the_version_that_it_means_now(home: Home) -> None:
     accepted = home.accept(spec())
     assert accepted.spec == spec(start="glass@1.0.0")
-    assert accepted.notes == ("The training begins with glass@1.0.0, and the network keeps its size, 4 units.",)
+    assert accepted.notes == ("The training starts from glass@1.0.0, and the network keeps its size, 4 units.",)
     before = home.plan(accepted.spec)
     home.publish(TRAIN.ask(before, [(NEW.digest, home.labels[0])], None), "b")
     assert home.accept(spec(start="glass")).spec.start_from == "glass@1.1.0"

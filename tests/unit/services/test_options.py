@@ -96,7 +96,7 @@ def test_budgets_are_sorted_and_unique() -> None:
         ({"budgets": (float("nan"),)}, "A budget of nan "),
         ({"budgets": (float("inf"),)}, "A budget of inf "),
         ({"budgets": (1e-9,)}, "A budget of 1e-09 is less than one fragment of a picture of 1430x960 pixels."),
-        ({"budgets": tuple(float(i) for i in range(1, 18))}, "17 budgets are not possible."),
+        ({"budgets": tuple(float(i) for i in range(1, 18))}, "17 budgets are too few or too many."),
         ({"alpha": 0.0}, "--alpha 0 is not between 0 and 1 (both excluded)."),
         ({"alpha": 1.0}, "--alpha 1 is not between 0 and 1"),
         ({"alpha": float("nan")}, "--alpha nan is not between"),

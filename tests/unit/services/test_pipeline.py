@@ -251,7 +251,7 @@ def test_a_version_has_a_card_with_the_licences_of_what_it_learned_and_what_was_
     )
     assert "| bottles | CC-BY-NC-4.0; Jane | forbidden |" in card
     assert "| knots | unknown: none is stated | unknown |" in card
-    assert "2 views of 1 scenes that it was not trained on" in card
+    assert "2 views of 1 scene that it was not trained on" in card
     assert "| 1 | 2 | 1.00 | 0.500 | 10.0 |" in card
     assert "In none of 2 cells" in card
     assert "diaphane build bottles.usdc knots.usdc town.usdc --name glass --holdout town.usdc --budgets 1" in card

@@ -89,7 +89,7 @@ def test_a_key_has_so_many_scenes_waiting_and_another_one_is_not_concerned(scene
 
 @pytest.mark.parametrize("paths", [["a.usda", "A.usda"], ["a.usda", "a.usda/b.png"]])
 def test_names_that_clash_on_some_file_system_are_refused(paths: list[str], scenes: Scenes, sha256: str) -> None:
-    with pytest.raises(Problem, match="side by side"):
+    with pytest.raises(Problem, match="cannot tell apart"):
         scenes.create("one", paths[0], dict.fromkeys(paths, sha256), "key_1")
 
 

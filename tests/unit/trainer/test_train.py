@@ -190,8 +190,8 @@ def test_assets_to_stop_by_are_whole_and_a_share_of_all(assets: str, count: int)
 def test_replayed_assets_are_not_forgotten() -> None:
     old, new = [random_view("old", 1, alpha=EVEN)], [random_view("new", 2, alpha=EVEN)]
     new[0].features[:] *= -1.0  # the same curves, said in other words
-    began = train(old, (), CONFIG.model_copy(update={"steps": 1200, "validate_every": 100}))
-    config = CONFIG.model_copy(update={"steps": 1200, "validate_every": 1200})
+    began = train(old, (), CONFIG.model_copy(update={"steps": 500, "validate_every": 100}))
+    config = CONFIG.model_copy(update={"steps": 500, "validate_every": 500})
     without, with_replay = (train(new, (), config, start=began.weights, replay=replay).weights for replay in ((), old))
     before, lost, kept = (geometric_mean(evaluate(found, old)) for found in (began.weights, without, with_replay))
     assert kept < 1.1 * before < 0.8 * lost

@@ -62,7 +62,7 @@ class Feature:
 
 @dataclass(frozen=True)
 class SelfTest:
-    """Inputs, [R][features], and the answers to them in float64, [R][outputs], whose sizes are `scale`, [outputs]."""
+    """Inputs, [R, features], and the answers to them in float64, [R, outputs], whose sizes are `scale`, [outputs]."""
 
     features: list[list[float]]
     outputs: list[list[float]]

@@ -62,6 +62,9 @@ class Bins:
 def check_counts(counts: NDArray[np.integer]) -> None:
     """Refuses counts that are none.
 
+    Args:
+        counts: Integers [P, bins], fragments of each depth bin of each pixel.
+
     Raises:
         ValueError: They are not whole numbers >= 0, [P, 1 to MOST_BINS].
     """
@@ -134,7 +137,12 @@ def importance_ranks(importance: NDArray[np.floating], counts: NDArray[np.intege
 
 
 def ranks_of(prices: Array, counts: NDArray[np.integer]) -> NDArray[np.uint8]:
-    """Ranks of prices, uint8 [P, bins]: an empty bin has that of the bins in front of it, and NaN is last."""
+    """Ranks of prices, uint8 [P, bins]: an empty bin has that of the bins in front of it, and NaN is last.
+
+    Args:
+        prices: float32 [P, bins], negated log gain per fragment.
+        counts: Integers [P, bins], fragments of each bin.
+    """
     with np.errstate(over="ignore"):
         steps = (prices - np.float32(LEAST_PRICE)) * np.float32(PRICE_STEPS)
     last = np.float32(RANKS - 1)

@@ -24,10 +24,10 @@ TAG = f'"{HASH}"'
 PATH = f"/v1/blobs/sha256/{HASH}"
 
 
-@pytest.fixture
-def stored(api: Api) -> Api:
-    api.service.storage.blobs.put_bytes(DATA)
-    return api
+@pytest.fixture(scope="module")
+def stored(shared: Api) -> Api:
+    shared.service.storage.blobs.put_bytes(DATA)
+    return shared
 
 
 def test_a_file_is_sent_whole_with_what_a_cache_needs(stored: Api) -> None:
@@ -93,12 +93,13 @@ def test_only_hashes_name_files(stored: Api, path: str, status: int) -> None:
     assert stored.get(f"/v1/blobs/sha256/{path}").status_code == status
 
 
-def test_a_damaged_file_is_not_sent(stored: Api) -> None:
-    path = stored.service.storage.blobs.path(HASH)
+def test_a_damaged_file_is_not_sent(api: Api) -> None:
+    api.service.storage.blobs.put_bytes(DATA)
+    path = api.service.storage.blobs.path(HASH)
     path.chmod(0o644)
     path.write_bytes(b"x" * 100)
     os.utime(path, (1, 1))
-    assert stored.get(PATH).status_code == 404
+    assert api.get(PATH).status_code == 404
 
 
 def test_which_files_are_missing(stored: Api) -> None:

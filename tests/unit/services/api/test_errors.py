@@ -25,34 +25,34 @@ def _problem(answer: Any) -> str:
     return str(document["type"]).rpartition("/")[2]
 
 
-def test_every_problem_is_explained(api: Api) -> None:
-    listed = api.get("/v1/problems", None).json()["items"]
+def test_every_problem_is_explained(shared: Api) -> None:
+    listed = shared.get("/v1/problems", None).json()["items"]
     assert [one["slug"] for one in listed] == list(CATALOGUE)
     for slug in CATALOGUE:
-        assert api.get(f"/v1/problems/{slug}", None).json()["explanation"]
+        assert shared.get(f"/v1/problems/{slug}", None).json()["explanation"]
         assert Refusal(slug).document().type == f"/v1/problems/{slug}"
-    assert _problem(api.get("/v1/problems/none", None)) == "not-found"
+    assert _problem(shared.get("/v1/problems/none", None)) == "not-found"
 
 
-def test_an_address_that_does_not_exist(api: Api) -> None:
+def test_an_address_that_does_not_exist(shared: Api) -> None:
     for path in ("/nothing", "/v1/jobs/", "/v1/jobs/nonsense", "/v1/models/UPPER"):
-        answer = api.get(path)
+        answer = shared.get(path)
         assert (answer.status_code, _problem(answer)) == (404, "not-found")
 
 
-def test_a_method_that_does_not_exist_says_which_do(api: Api) -> None:
-    answer = api.request("PUT", "/v1/keys")
+def test_a_method_that_does_not_exist_says_which_do(shared: Api) -> None:
+    answer = shared.request("PUT", "/v1/keys")
     assert (_problem(answer), answer.headers["allow"]) == ("method-not-allowed", "GET, POST")
-    answer = api.request("POST", "/v1/blobs/sha256/" + "0" * 64)
+    answer = shared.request("POST", "/v1/blobs/sha256/" + "0" * 64)
     assert answer.headers["allow"] == "GET, HEAD"
 
 
-def test_places_in_the_request_are_named_without_repeating_what_was_sent(api: Api) -> None:
-    answer = api.post("/v1/jobs", json=build_spec("scn_secret", budgets=["secret"]))
+def test_places_in_the_request_are_named_without_repeating_what_was_sent(shared: Api) -> None:
+    answer = shared.post("/v1/jobs", json=build_spec("scn_secret", budgets=["secret"]))
     assert _problem(answer) == "invalid"
     assert {one["at"] for one in answer.json()["errors"]} >= {"body.scenes.0.scene", "body.budgets.0"}
     assert "secret" not in answer.text
-    assert _problem(api.get("/v1/jobs?limit=201")) == "invalid"
+    assert _problem(shared.get("/v1/jobs?limit=201")) == "invalid"
 
 
 @pytest.mark.parametrize(
@@ -73,8 +73,8 @@ def test_places_in_the_request_are_named_without_repeating_what_was_sent(api: Ap
         (b'{"seed": ' + b"1" * 5000 + b"}", "not JSON"),
     ],
 )
-def test_a_body_that_is_not_well_formed(api: Api, body: bytes, why: str) -> None:
-    answer = api.post("/v1/jobs", content=body, headers=JSON)
+def test_a_body_that_is_not_well_formed(shared: Api, body: bytes, why: str) -> None:
+    answer = shared.post("/v1/jobs", content=body, headers=JSON)
     assert _problem(answer) == "malformed"
     assert why in answer.json()["detail"]
 

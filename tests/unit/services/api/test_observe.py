@@ -25,8 +25,8 @@ def test_a_request_id_is_made_or_repeated(api: Api) -> None:
         *(("evil.example", 421), ("localhost.evil.example", 421), ("evil.example:8035", 421), ("", 421)),
     ],
 )
-def test_only_its_own_names_are_answered(api: Api, host: str, status: int) -> None:
-    answer = api.get("/v1/jobs", headers={"Host": host})
+def test_only_its_own_names_are_answered(shared: Api, host: str, status: int) -> None:
+    answer = shared.get("/v1/jobs", headers={"Host": host})
     assert answer.status_code == status
     if status == 421:
         assert answer.json()["type"] == "/v1/problems/misdirected"

@@ -15,18 +15,18 @@ PLAIN = [path for path, operations in build_document()["paths"].items() if "get"
 
 
 @pytest.mark.parametrize("path", PLAIN)
-def test_an_unknown_parameter_is_refused_by_name(api: Api, path: str) -> None:
-    answer = api.get(f"{path}?lmit=5", "admin")
+def test_an_unknown_parameter_is_refused_by_name(shared: Api, path: str) -> None:
+    answer = shared.get(f"{path}?lmit=5", "admin")
     assert (answer.status_code, answer.json()["type"]) == (422, "/v1/problems/invalid")
     assert answer.json()["errors"] == [{"at": "query.lmit", "message": "is nothing that is known here"}]
 
 
 @pytest.mark.parametrize("path", ["/v1/jobs", "/v1/measurements"])
-def test_a_parameter_that_is_given_twice_is_refused(api: Api, path: str) -> None:
-    answer = api.get(f"{path}?limit=5&limit=6")
+def test_a_parameter_that_is_given_twice_is_refused(shared: Api, path: str) -> None:
+    answer = shared.get(f"{path}?limit=5&limit=6")
     assert answer.status_code == 422
     assert answer.json()["errors"] == [{"at": "query.limit", "message": "is given twice"}]
-    assert api.get(f"{path}?limit=5").status_code == 200
+    assert shared.get(f"{path}?limit=5").status_code == 200
 
 
 def test_of_routes_with_ids_and_of_what_changes_something_too(api: Api) -> None:

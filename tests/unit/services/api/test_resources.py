@@ -73,19 +73,29 @@ def _all(api: Api, path: str) -> list[Any]:
         path = answer.links["next"]["url"]
 
 
-@pytest.fixture(params=["sqlite", "postgresql"])
-def full(request: pytest.FixtureRequest, tmp_path: Path) -> Api:
+@pytest.fixture
+def full(database_url: str, tmp_path: Path) -> Api:
     """A service with several of everything."""
+    return _filled(tmp_path, database_url)
+
+
+@pytest.fixture(scope="module", params=["sqlite", "postgresql"])
+def read(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Api:
+    """The same for tests that change nothing."""
     url = ""
     if request.param == "postgresql":
         server: Postgres = request.getfixturevalue("postgres")
         url = server.new_database()
-    api = Api(tmp_path, url)
+    return _filled(tmp_path_factory.mktemp("read"), url, rate=1e6, burst=10**6)
+
+
+def _filled(folder: Path, url: str, **settings: Any) -> Api:
+    api = Api(folder, url, **settings)
     for index in range(3):
         api.job(name=f"glass-{index}")
         api.scene(f"#usda 1.0\n# {index}\n")
         api.service.measured.record_dataset({"seed": index}, [shard()], None)
-        api.version(tmp_path / f"bundle{index}", str(index))
+        api.version(folder / f"bundle{index}", str(index))
     names = [str(index) for index in range(5)]
     api.service.measured.record("evaluate/a", [measurement(view=n) for n in names], {"bottles": HASH}, None, None)
     job = api.get("/v1/jobs").json()["items"][0]["id"]
@@ -100,8 +110,8 @@ def full(request: pytest.FixtureRequest, tmp_path: Path) -> Api:
     return api
 
 
-def test_lists_are_the_same_in_pages_of_any_size(full: Api) -> None:
-    job = full.get("/v1/jobs").json()["items"][0]["id"]
+def test_lists_are_the_same_in_pages_of_any_size(read: Api) -> None:
+    job = read.get("/v1/jobs").json()["items"][0]["id"]
     for path, count in {
         "/v1/jobs": 3,
         f"/v1/jobs/{job}/tasks": 10,
@@ -112,10 +122,10 @@ def test_lists_are_the_same_in_pages_of_any_size(full: Api) -> None:
         "/v1/models/glass/versions": 3,
         "/v1/keys": 4,
     }.items():
-        whole = _all(full, path)
+        whole = _all(read, path)
         assert len(whole) == count, path
-        assert _all(full, f"{path}?limit=1") == whole, path
-        assert _all(full, f"{path}?limit=2") == whole, path
+        assert _all(read, f"{path}?limit=1") == whole, path
+        assert _all(read, f"{path}?limit=2") == whole, path
 
 
 def test_what_comes_meanwhile_moves_no_page(full: Api) -> None:
@@ -127,15 +137,15 @@ def test_what_comes_meanwhile_moves_no_page(full: Api) -> None:
 
 
 @pytest.mark.parametrize("cursor", ["x", "!!!!", "bnVsbA==", "WzEsMl0=", "WzEuMCwiJyBvciAxPTEiXQ==", "W05hTiwiYSJd"])
-def test_a_cursor_of_something_else_is_refused(api: Api, cursor: str) -> None:
+def test_a_cursor_of_something_else_is_refused(shared: Api, cursor: str) -> None:
     for path in ("/v1/jobs", "/v1/scenes", "/v1/datasets", "/v1/measurements"):
-        answer = api.get(path, params={"cursor": cursor})
+        answer = shared.get(path, params={"cursor": cursor})
         assert (answer.status_code, answer.json()["type"]) == (422, "/v1/problems/invalid")
 
 
-def test_filters_are_kept_in_the_link(full: Api) -> None:
-    assert [job["name"] for job in _all(full, "/v1/jobs?name=glass-1&limit=1")] == ["glass-1"]
-    link = full.get("/v1/measurements?technique=kbuffer&limit=2").links["next"]["url"]
+def test_filters_are_kept_in_the_link(read: Api) -> None:
+    assert [job["name"] for job in _all(read, "/v1/jobs?name=glass-1&limit=1")] == ["glass-1"]
+    link = read.get("/v1/measurements?technique=kbuffer&limit=2").links["next"]["url"]
     assert "technique=kbuffer" in link
     assert link.startswith("/v1/measurements?")
 
@@ -151,13 +161,13 @@ def test_filters_are_kept_in_the_link(full: Api) -> None:
         ("until=2020-01-01T00:00:00%2B02:00", 0),
     ],
 )
-def test_measurements_by(full: Api, query: str, count: int) -> None:
-    assert len(full.get(f"/v1/measurements?{query}").json()["items"]) == count
+def test_measurements_by(read: Api, query: str, count: int) -> None:
+    assert len(read.get(f"/v1/measurements?{query}").json()["items"]) == count
 
 
 @pytest.mark.parametrize("query", ["since=0.5", "since=yesterday", "budget=nan", "budget=inf", "scene=%00", "job=x"])
-def test_filters_that_mean_nothing(api: Api, query: str) -> None:
-    assert api.get(f"/v1/measurements?{query}").status_code == 422
+def test_filters_that_mean_nothing(shared: Api, query: str) -> None:
+    assert shared.get(f"/v1/measurements?{query}").status_code == 422
 
 
 def test_aliases_move_and_come_back_with_their_history(full: Api) -> None:
@@ -270,18 +280,18 @@ def _job(**changes: Any) -> dict[str, Any]:
     ],
 )
 def test_a_promotion_needs_the_scope_for_it(
-    api: Api, scope: str, asked: str | None, status: int, promote: str | None
+    shared: Api, scope: str, asked: str | None, status: int, promote: str | None
 ) -> None:
-    body = _job(scenes=[{"scene": api.scene()}], **({} if asked is None else {"promote": asked}))
-    answer = api.post("/v1/jobs", scope, json=body)
+    body = _job(scenes=[{"scene": shared.scene()}], **({} if asked is None else {"promote": asked}))
+    answer = shared.post("/v1/jobs", scope, json=body)
     assert answer.status_code == status, answer.text
     if promote is not None:
         assert answer.json()["spec"]["promote"] == promote
 
 
 @pytest.mark.parametrize("eye", [[0, 0, 1], [1e308, 1e185, 0]])
-def test_a_view_without_direction_is_refused_at_once(api: Api, eye: list[float]) -> None:
+def test_a_view_without_direction_is_refused_at_once(shared: Api, eye: list[float]) -> None:
     view = {"eye": eye, "target": [0, 0, 1], "up": [0, 1, 0], "fov": 40}
-    answer = api.post("/v1/jobs", json=_job(scenes=[{"scene": "scn_" + "0" * 32, "views": [view]}]))
+    answer = shared.post("/v1/jobs", json=_job(scenes=[{"scene": "scn_" + "0" * 32, "views": [view]}]))
     assert answer.status_code == 422
     assert "no direction" in answer.text

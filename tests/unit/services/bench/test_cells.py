@@ -43,6 +43,13 @@ def test_without_equal_memory_there_are_only_fragments(options: BenchOptions) ->
     assert all(cell.basis != "memory" for cell in planned(replace(options, equal_memory=False), None))
 
 
+def test_less_than_a_slot_a_pixel_is_no_memory_that_the_fixed_k_buffer_takes(options: BenchOptions) -> None:
+    cells = planned(replace(options, budgets=(0.25, 1.0), techniques=("kbuffer",)), None)
+    assert [(cell.basis, cell.budget_factor) for cell in cells] == [
+        *[("fragments", 0.25), ("fragments", 1.0), ("memory", 1.0)]
+    ]
+
+
 def test_the_learned_technique_has_the_tail_of_its_bundle(options: BenchOptions, tmp_path: Path) -> None:
     bundle = Bundle(tmp_path, "glass@0123", TailSpec(name="binned-8", g=0.5))
     names = "kbuffer-deep", "kbuffer-temporal"

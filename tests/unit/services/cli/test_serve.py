@@ -1,10 +1,14 @@
 from __future__ import annotations
 
+import socket
+from pathlib import Path
+
 import pytest
 
 from schemas.problem import ExitCode, Problem
 from services.api.server import is_loopback
-from services.cli.serve import show_first_key
+from services.cli.app import run
+from services.cli.serve import announce, show_first_key
 from services.cli.worker import parse_roles
 
 
@@ -58,3 +62,25 @@ def test_roles_are_named_by_commas_and_an_unknown_one_is_told() -> None:
         parse_roles("render,cook")
     with pytest.raises(Problem, match="No role"):
         parse_roles(" , ")
+
+
+def test_a_busy_port_is_said_before_a_key_is_made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = str(other.getsockname()[1])
+        assert run(["serve", "--port", port, "--state", str(tmp_path / "state")]) == ExitCode.CONFLICT
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    first, remedy = captured.err.splitlines()
+    assert first == f"error: Diaphane cannot listen on port {port} of 127.0.0.1: address already in use."
+    assert "--port" in remedy
+    assert not (tmp_path / "state").exists()
+
+
+def test_the_addresses_are_those_that_this_machine_reaches(capsys: pytest.CaptureFixture[str]) -> None:
+    announce("0.0.0.0", 8035)
+    first, *others = capsys.readouterr().out.splitlines()
+    assert first == "Diaphane serves http://0.0.0.0:8035"
+    assert "Dashboard: http://127.0.0.1:8035/" in others
+    assert others[-1].endswith("export DIAPHANE_URL=http://127.0.0.1:8035")
+    announce("::1", 80)
+    assert "Dashboard: http://[::1]:80/" in capsys.readouterr().out

@@ -24,7 +24,7 @@ VIEW = View(name="front", eye=(0.0, 0.0, 5.0), target=(0.0, 0.0, 0.0), up=(0.0, 
 def shot(**passes: float) -> Shot:
     rendered = Rendered(np.zeros((2, 3, 3), np.float32), np.arange(6, dtype=np.int32), {}, 15, 96, 20)
     wish = Wish("kbuffer", VIEW, (3, 2), 2.0, "density-16")
-    return Shot(wish, Budget(12, "density-16", 0.75), rendered, Recording(host=passes))
+    return Shot(wish, Budget(12, "density-16", 0.75), rendered, Recording(passes=passes))
 
 
 def compared(psnr: float | None = 30.0, flip: float | None = None) -> Compared:
