@@ -40,6 +40,40 @@ async function linear(renderer: WebGPURenderer, sample: Sample, budget: number):
   return made;
 }
 
+/** What the renderer holds after a pass was used, resized and given another budget, and disposed of; before, too. */
+async function life(renderer: WebGPURenderer): Promise<readonly (readonly number[])[]> {
+  const sample = SCENES["panes"]!();
+  const held = (): number[] => {
+    const { textures, renderTargets, storageAttributes } = renderer.info.memory as unknown as Record<string, number>;
+    return [textures!, renderTargets!, storageAttributes!];
+  };
+  await linear(renderer, sample, 0);
+  const before = held();
+  const pass = diaphanePass(sample.scene, sample.camera, { budget: 2 });
+  const pipeline = new RenderPipeline(renderer, pass);
+  pipeline.render();
+  const during = held();
+  renderer.setSize(120, 90);
+  pass.budget = 5;
+  pipeline.render();
+  pass.budget = 0;
+  pipeline.render();
+  renderer.setSize(WIDTH, HEIGHT);
+  pass.budget = 2;
+  pipeline.render();
+  const again = held();
+  pass.dispose();
+  pipeline.dispose();
+  return [before, during, again, held()];
+}
+
+/** A scene whose objects are drawn the other way round. */
+function reversed(sample: Sample): Sample {
+  const ours = sample.scene.children.slice().reverse();
+  ours.forEach((each, i) => (each.renderOrder = i));
+  return sample;
+}
+
 function agreement(one: Float64Array, two: Float64Array): Agreement {
   let [within, squares, most] = [0, 0, 0];
   for (let p = 0; p < one.length; p += 3) {
@@ -63,6 +97,6 @@ function drawn(picture: Float64Array, title: string): void {
   document.body.append(canvas);
 }
 
-const three = { start, SCENES, linear, peel: (r: WebGPURenderer, s: Sample): Promise<Reference> => peel(r, s, WIDTH, HEIGHT), agreement, drawn };
+const three = { start, SCENES, life, reversed, linear, peel: (r: WebGPURenderer, s: Sample): Promise<Reference> => peel(r, s, WIDTH, HEIGHT), agreement, drawn };
 Object.assign(globalThis, { three });
 export type Three = typeof three;
