@@ -16,7 +16,8 @@ const [UNIT, ROOT, PLAIN, MOST_EXPONENT, LEAST_OTHERS, LEAST_SPREAD] = [
   "LEAST_OTHERS",
   "LEAST_SPREAD",
 ].map((name) => Number(CONSTANTS[name])) as [number, number, number, number, number, number];
-const BINS = TAILS["binned-8"]!.bins;
+/** Of the tail with the fewest that have means: those that four targets hold. */
+const BINS = Math.min(...Object.values(TAILS).flatMap(({ bins, meanLevels }) => (meanLevels > 0 ? [bins] : [])));
 const MOST_UNITS = 2048;
 const FOURS = Array.from({ length: BINS / 4 }, (_, i) => i);
 
