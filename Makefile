@@ -6,7 +6,7 @@ ARGS ?=
 # The scenes that the result is judged by, and that are never trained on.
 HOLDOUT ?= bottles foliage
 
-.PHONY: help setup setup-tests quickstart bench bench-gpu check test lint format docs lock clean
+.PHONY: help setup setup-tests peers quickstart bench bench-gpu check test lint format docs lock clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -23,6 +23,9 @@ bench: setup ## every technique on the committed suite; goes on where it stopped
 
 bench-gpu: setup ## this machine's graphics card in ten minutes, unattended: one file for benchmarks/results
 	$(BIN)/python -m benchmarks.gpu $(ARGS)
+
+peers: ## OpenUSD's Storm in .venv-peers, to compare with (400 MB, GPL; nothing else here uses it)
+	@scripts/peers.sh
 
 lint: setup ## style, types, direction of imports
 	$(BIN)/ruff check .

@@ -86,7 +86,7 @@ class BenchCell(CellKey):
         pixel_bytes: All other buffers beside it, bytes a pixel.
         early_bytes: Most before there is a pool, bytes a pixel.
         total_bytes: The peak of the frame: pool and what lives beside it, or what was there before;
-            of multilayer and adaptive their nodes, which the pool emulates.
+            of multilayer and adaptive their nodes, of an engine's lists what the engine takes; the pool emulates them.
         fits: Whether the pool is no larger than one storage buffer (`schemas.limits.LIMITS.buffer_bytes`). A larger one
             is rendered in bands of rows, or not at all (`problem`); the bytes are what the whole frame needs.
         score: (mse + LOSSLESS) / (mse of the oracle + LOSSLESS).

@@ -1,6 +1,7 @@
 """How long work tells the user where it is: bars on a terminal, lines in a log, nothing for `--json`.
 
-Everything goes to stderr; stdout belongs to the result.
+Everything goes to stderr; stdout belongs to the result. rich is imported by what draws: child processes, which only
+report, start without it.
 """
 
 from __future__ import annotations
@@ -9,11 +10,12 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
-from typing import Protocol, TextIO
+from typing import TYPE_CHECKING, Protocol, TextIO
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from rich.progress import Progress as RichBars
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress as RichBars
+    from rich.progress import TaskID
 
 
 class Stage(Protocol):
@@ -104,13 +106,15 @@ class RichProgress(SilentProgress):
     @contextmanager
     def stage(self, name: str, total: int) -> Iterator[Stage]:
         """See `Progress.stage`."""
-        bars = RichBars(
-            TextColumn("{task.description:<22}"),
-            BarColumn(bar_width=28),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TimeRemainingColumn(),
-            TextColumn("[dim]{task.fields[note]}"),
+        from rich import progress
+
+        bars = progress.Progress(
+            progress.TextColumn("{task.description:<22}"),
+            progress.BarColumn(bar_width=28),
+            progress.MofNCompleteColumn(),
+            progress.TimeElapsedColumn(),
+            progress.TimeRemainingColumn(),
+            progress.TextColumn("[dim]{task.fields[note]}"),
             console=self._console,
         )
         with bars:
@@ -138,5 +142,7 @@ def make_progress(stream: TextIO, *, silent: bool = False) -> Progress:
     if silent:
         return SilentProgress()
     if stream.isatty():
+        from rich.console import Console
+
         return RichProgress(Console(file=stream))
     return PlainProgress(stream)

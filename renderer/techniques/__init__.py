@@ -4,6 +4,7 @@ from renderer.techniques.abuffer_array import ABufferArray
 from renderer.techniques.abuffer_list import ABufferList
 from renderer.techniques.adaptive import Adaptive
 from renderer.techniques.base import Budget, Rendered, Technique
+from renderer.techniques.bevy import Bevy
 from renderer.techniques.binned import Binned
 from renderer.techniques.depth_peeling import DepthPeeling
 from renderer.techniques.dual_depth_peeling import DualDepthPeeling
@@ -18,6 +19,8 @@ from renderer.techniques.multilayer import Multilayer
 from renderer.techniques.registry import TECHNIQUES, Entry, Needs, technique
 from renderer.techniques.sbuffer import SBuffer
 from renderer.techniques.stochastic import Stochastic
+from renderer.techniques.storm_rules import StormRules
+from renderer.techniques.wavelet import Wavelet
 from renderer.techniques.weighted_average import WeightedAverage
 from renderer.techniques.weighted_blended import WeightedBlended
 
@@ -26,6 +29,7 @@ __all__ = [
     "ABufferArray",
     "ABufferList",
     "Adaptive",
+    "Bevy",
     "Binned",
     "Budget",
     "DepthPeeling",
@@ -43,7 +47,9 @@ __all__ = [
     "Rendered",
     "SBuffer",
     "Stochastic",
+    "StormRules",
     "Technique",
+    "Wavelet",
     "WeightedAverage",
     "WeightedBlended",
     "technique",

@@ -46,7 +46,8 @@ class Rendered:
         pixel_bytes: Bytes a pixel of all other buffers that live beside the pool. The picture itself is not counted.
         early_bytes: Bytes a pixel at most before there is a pool, where that is known to be more than none.
         node_bytes: Bytes a pixel of a technique that keeps nodes in place where a device has fragment-shader interlock,
-            as its authors count them; what is allocated here is its emulation. None: the technique is what is here.
+            as its authors count them, or of an engine's pool and heads; what is allocated here is its emulation. None:
+            the technique is what is here.
         skips: What was not needed and is exact without it: words -> how often. See `renderer.techniques.skips`.
     """
 

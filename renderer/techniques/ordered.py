@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from renderer.csr import offsets_of
 from renderer.frame import Clock, Frame
 from renderer.screen import read_linear
+from renderer.techniques.arrivals import Arrivals
 from renderer.techniques.bands import Part, check_most, in_bands
 from renderer.techniques.base import Rendered
 from renderer.techniques.runs import PIXEL_BYTES, Runs
@@ -32,6 +33,19 @@ NODE_BYTES = 8
 
 _WORDS = 3
 """Packed colour, depth and rank."""
+
+
+@dataclass(frozen=True, slots=True)
+class EnginePool:
+    """The one pool of a frame from which an engine takes the nodes of all lists; what does not fit is lost.
+
+    Attributes:
+        slots: Nodes a pixel on average: `slots * W * H` in all.
+        pixel_bytes: Bytes a pixel that the engine takes, for nodes and heads.
+    """
+
+    slots: int
+    pixel_bytes: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,18 +104,19 @@ def check_nodes(technique: str, nodes: int, least: int) -> int:
     return nodes
 
 
-def render_ordered(frame: Frame, technique: str, nodes: int) -> Rendered:
+def render_ordered(frame: Frame, technique: str, nodes: int, engine: EnginePool | None = None) -> Rendered:
     """Capture in the order of submission, then composite each pixel's run with a fixed number of nodes.
 
     Args:
         frame: The view.
         technique: Its name: `<technique>/resolve.frag` composites, with NODES defined.
         nodes: Nodes a pixel, see `check_nodes`.
+        engine: The pool whose overflow is lost; None: every fragment is composited.
 
     Returns:
         The picture. `pool_bytes` are those of the captured fragments of the whole window; above the limit of a storage
         buffer, bands of rows use one part of that size after the other. `node_bytes` are what the technique would hold
-        instead with interlock.
+        instead with interlock, or what the engine takes.
 
     Raises:
         Problem: A pixel has more fragments than a shader can loop over, or one row more than a storage buffer holds.
@@ -109,14 +124,18 @@ def render_ordered(frame: Frame, technique: str, nodes: int) -> Rendered:
     clock = Clock(frame.ctx)
     runs = Runs(frame, clock, _WORDS)
     check_most(runs.most)
+    slots = frame.pixels * engine.slots if engine else 0
+    arrivals = Arrivals(frame, clock, slots) if engine and runs.total > slots else None
 
     def store(part: Part) -> list[moderngl.Buffer]:
         pool = runs.capture(part)
         runs.sort(part)
+        if arrivals:
+            arrivals.bind()
         return [pool]
 
-    defines = {"NODES": nodes, "WORDS": _WORDS}
-    image = in_bands(frame, clock, runs.tiles, runs.parts(), store, f"{technique}/resolve.frag", defines)
+    defines = {"NODES": nodes, "WORDS": _WORDS, "FULL": int(arrivals is not None)}
+    image = in_bands(frame, clock, runs.tiles, runs.parts(), store, f"{technique}/resolve.frag", defines, slots=slots)
     linear = read_linear(frame, image)
     k = np.minimum(runs.read_counts(), nodes).astype(np.int32)
     return Rendered(
@@ -124,8 +143,8 @@ def render_ordered(frame: Frame, technique: str, nodes: int) -> Rendered:
         k=k,
         passes={**frame.passes("opaque"), **clock.passes},
         captured=int(k.sum(dtype=np.int64)),
-        pool_bytes=runs.pool_bytes,
+        pool_bytes=runs.pool_bytes + (arrivals.nbytes if arrivals else 0),
         pixel_bytes=PIXEL_BYTES,
-        node_bytes=NODE_BYTES * nodes,
+        node_bytes=engine.pixel_bytes if engine else NODE_BYTES * nodes,
         skips=frame_skips(frame, runs.tiles),
     )

@@ -12,6 +12,7 @@ from renderer.techniques.abuffer_array import ABufferArray
 from renderer.techniques.abuffer_list import ABufferList
 from renderer.techniques.adaptive import Adaptive
 from renderer.techniques.base import Technique
+from renderer.techniques.bevy import Bevy
 from renderer.techniques.binned import Binned
 from renderer.techniques.depth_peeling import DepthPeeling
 from renderer.techniques.dual_depth_peeling import DualDepthPeeling
@@ -25,6 +26,8 @@ from renderer.techniques.moment import Moment
 from renderer.techniques.multilayer import Multilayer
 from renderer.techniques.sbuffer import SBuffer
 from renderer.techniques.stochastic import Stochastic
+from renderer.techniques.storm_rules import StormRules
+from renderer.techniques.wavelet import Wavelet
 from renderer.techniques.weighted_average import WeightedAverage
 from renderer.techniques.weighted_blended import WeightedBlended
 from schemas.problem import ExitCode, Problem
@@ -144,5 +147,8 @@ TECHNIQUES: Mapping[str, Entry] = {
         "visibility from random depth samples (Enderton)",
         lambda needs: Stochastic() if needs.samples is None else Stochastic(needs.samples),
     ),
+    Wavelet.name: Entry("approximate", "transmittance from 16 Haar coefficients (Aizenshtein)", lambda _: Wavelet()),
+    Bevy.name: Entry("approximate", "Bevy's lists: 8 sorted, overflow lost", lambda _: Bevy()),
+    StormRules.name: Entry("approximate", "Storm's lists: the last 8, overflow lost", lambda _: StormRules()),
 }
 """Every technique, in the order in which lists show them."""

@@ -6,7 +6,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Response
 
+from schemas.advice import Advice
 from schemas.service import SceneRecord, SceneState
+from services.advice.amounts import parse_frame, parse_memory
+from services.advice.stored import stored_advice
 from services.api.answers import NewScene, ScenePage
 from services.api.body import JsonBody
 from services.api.pages import LINK_HEADER, MOMENT, Page
@@ -14,6 +17,7 @@ from services.api.parts import SceneIdPath, Services
 from services.api.places import moment
 from services.api.security import Caller, Needs
 from services.database import tables
+from services.problems import Refusal
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
 
@@ -46,3 +50,24 @@ def list_scenes(service: Services, paging: Page, state: Annotated[SceneState | N
 def read_scene(scene_id: SceneIdPath, service: Services) -> SceneRecord:
     """A scene."""
     return service.scenes.get(scene_id)
+
+
+@router.get("/{scene_id}/advice")
+def read_advice(
+    scene_id: SceneIdPath,
+    service: Services,
+    memory: Annotated[
+        str, Query(pattern=r"^[1-9][0-9]{0,5}(?:KiB|MiB|GiB)$", description="That all buffers of a frame may take.")
+    ] = "64MiB",
+    size: Annotated[
+        str | None,
+        Query(pattern=r"^[1-9][0-9]{1,4}x[1-9][0-9]{1,4}$", description="Of the frame; default: as measured."),
+    ] = None,
+) -> Advice:
+    """Which technique the scene needs within a memory, by what jobs have measured on it."""
+    scene = service.scenes.get(scene_id)
+    frame = None if size is None else parse_frame(size)
+    found = stored_advice(service.database, scene.name, scene.digest, frame, parse_memory(memory))
+    if found is None:
+        raise Refusal("not-found", "Nothing was measured on this scene yet.", "Submit a job `evaluate` with it.")
+    return found

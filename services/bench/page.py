@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from itertools import groupby
 
 from schemas.bench import BenchResult, BenchView
+from services.advice.gathered import of_bench
+from services.advice.page import part
 from services.bench.account import said_device
 from services.bench.bars import error_bars
 from services.bench.groups import (
@@ -66,6 +68,7 @@ def page(result: BenchResult, plots: Sequence[str], mixed: str | None) -> str:
             mixed=mixed,
             figures=figures,
             groups=shown,
+            advice=[(each.title, part(of_bench(each.title, each.views))) for each in groups],
             plots=plots,
             charts=charts_of,
             by_budget=_by_budget,

@@ -19,6 +19,7 @@ from typer.exceptions import Abort, Exit, TyperException
 
 from schemas.problem import ExitCode, Problem
 from services.cli import (
+    advise,
     bench,
     build,
     config,
@@ -37,6 +38,7 @@ from services.cli import (
     scene,
     scenes,
     serve,
+    storm,
     stress,
     view,
     worker,
@@ -55,10 +57,12 @@ add_command(app, "build", build.build, "schemas.options:Options")
 app.command("render")(render.render)
 app.command("view")(view.view)
 app.command("dump")(dump.dump)
+app.command("advise")(advise.advise)
 add_command(app, "bench", bench.bench, "schemas.work:Device")
 app.add_typer(scene.app, name="scene")
 app.command("samples")(samples.samples)
 app.command("stress")(stress.stress)
+app.add_typer(storm.app, name="storm")
 app.command("serve")(serve.serve)
 app.command("worker")(worker.worker)
 add_command(app, "retrain", retrain.retrain, "schemas.job:JobSpec", without=retrain.OWN, variables=retrain.VARIABLES)

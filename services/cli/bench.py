@@ -133,9 +133,11 @@ def bench(
         resume=resume,
         state=state,
     )
+    from services.advice.gathered import of_bench
     from services.bench.files import write_files
     from services.bench.run import bench as run
     from services.bench.run import check_same_code, no_views
+    from services.cli.advise import show_sentences
     from services.cli.bench_table import show
 
     if not as_json:
@@ -151,6 +153,8 @@ def bench(
     groups = groups_of(result.views)
     for each in [*groups, *([group("All of them", result.views)] if len(groups) > 1 else [])]:
         show(each, result.device)
+    for each in groups:
+        show_sentences(of_bench(each.title, each.views))
     if note := check_same_code(result):
         progress.note(note)
     if note := said_left_out([techniques], bundle is not None):

@@ -17,6 +17,7 @@ from services.cli.server import URL_VARIABLE
 from services.cli.state import DEFAULT_STATE, STATE_VARIABLE, StateOption
 
 if TYPE_CHECKING:
+    from services.api.server import Server
     from services.service import Service
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 8035
@@ -38,10 +39,14 @@ def serve(
 
     wanted = () if roles.strip() == "none" else parse_roles(roles)
     os.environ[STATE_VARIABLE] = str(state)
-    from services import logs
-    from services.engine.runtime import Runtime
-    from services.service import open_service
-    from services.settings import Settings
+    from services.loading import uncollected
+
+    with uncollected():
+        from services import logs
+        from services.api.server import make_server
+        from services.engine.runtime import Runtime
+        from services.service import open_service
+        from services.settings import Settings
 
     logs.set_up()
     settings = Settings()
@@ -51,7 +56,8 @@ def serve(
     runtime = Runtime(settings, wanted) if wanted else None  # with a store of its own, which waits longer
     stop = threading.Event()
     stop_on_signal(stop.set)
-    listener = _Listener(service, host, port)
+    names = [name.strip() for name in settings.hosts.split(",") if name.strip()]
+    listener = _Listener(make_server(service, host, port, names), host, port, settings.drain_seconds)
     with ExitStack() as stack:
         stack.callback(listener.stop)
         listener.start()
@@ -70,13 +76,10 @@ def serve(
 class _Listener(threading.Thread):
     """The HTTP server, in a thread: signals belong to the main one."""
 
-    def __init__(self, service: Service, host: str, port: int) -> None:
+    def __init__(self, server: Server, host: str, port: int, drain_seconds: float) -> None:
         super().__init__(daemon=True, name="http")
-        from services.api.server import make_server
-
-        names = [name.strip() for name in service.settings.hosts.split(",") if name.strip()]
-        self._server = make_server(service, host, port, names)
-        self._where, self._drain_seconds = (host, port), service.settings.drain_seconds
+        self._server = server
+        self._where, self._drain_seconds = (host, port), drain_seconds
 
     @property
     def port(self) -> int:

@@ -29,9 +29,12 @@ def worker(
     """Do the tasks of a service. Database and store are set by DIAPHANE_DATABASE and DIAPHANE_STORE."""
     wanted = parse_roles(roles)
     os.environ[STATE_VARIABLE] = str(state)
-    from services import logs
-    from services.engine.runtime import Runtime
-    from services.settings import Settings
+    from services.loading import uncollected
+
+    with uncollected():
+        from services import logs
+        from services.engine.runtime import Runtime
+        from services.settings import Settings
 
     logs.set_up()
     runtime = Runtime(Settings(), wanted)

@@ -13,10 +13,10 @@ from markupsafe import Markup
 from schemas.glass import DEFAULT_GLASS
 from schemas.measurement import Measurement
 from services import summary
-from services.dashboard.scene_views import camera_of, setting_of
 from services.database import Database
 from services.database.tables import measurements as table
 from services.report import charts
+from services.scene_views import camera_of, setting_of
 
 WORSE = 1.05
 """Error over that of the version before from which a scene counts as worse."""

@@ -12,16 +12,18 @@ from PIL import Image
 
 from schemas.limits import LIMITS
 from schemas.service import SceneState
+from services.advice.page import part
+from services.advice.stored import advice_of
 from services.api.etags import is_current
 from services.api.pages import MOMENT, Page
 from services.api.parts import SceneIdPath, Services
 from services.api.places import moment
 from services.dashboard import measured
 from services.dashboard.page import PageRoute, render
-from services.dashboard.scene_views import SeenView, Shot, certificates, views
 from services.database import tables
 from services.problems import Refusal
 from services.report import colours
+from services.scene_views import SeenView, Shot, certificates, views
 from services.service import Service
 from services.store import MissingArtifact
 
@@ -59,6 +61,7 @@ def show_scene(
     shown = next((one for one in seen if one.name == view), seen[0] if seen else None)
     budgets = shown.budgets() if shown else []
     factor = next((one for one in budgets if f"{one:g}" == budget), budgets[len(budgets) // 2] if budgets else None)
+    advice = advice_of(scene.name, seen)
     everything = [shot.measured for one in seen for shot in one.shots]
     return render(
         request,
@@ -68,6 +71,7 @@ def show_scene(
         shown=shown,
         budgets=budgets,
         factor=factor,
+        advice=None if advice is None else part(advice),
         comparison=measured.compare(everything, scene.name) if everything else None,
         models=sorted({shot.model for one in seen for shot in one.shots if shot.model}),
         certificates=certificates(service.storage.store, shown) if shown else [],

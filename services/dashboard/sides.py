@@ -11,11 +11,11 @@ import sqlalchemy as sa
 
 from schemas.measurement import Measurement
 from services import summary
-from services.dashboard.scene_views import Shot, newest, setting_of
 from services.database import Database
 from services.database.tables import measurements as table
 from services.database.tables import scenes
 from services.problems import Refusal
+from services.scene_views import Shot, newest, setting_of
 from services.stages.pictures import EXACT
 
 _MOST_ROWS = 2_000

@@ -259,7 +259,7 @@ class Runtime:
         DBOS(config=config)
         DBOS.listen_queues(list(self._slots))
         DBOS.launch()
-        system.limit_slots(self._claimable)
+        system.steer_claims(self._database, self._claimable)
         system.bound_waits()
 
     def _child_options(self, children: int) -> ChildOptions:

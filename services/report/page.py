@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
 
 from schemas.measurement import Measurement, ReportData
 from services import summary
@@ -37,13 +38,16 @@ class Section:
     best: dict[tuple[float, str], float]
 
 
-def write_report(path: Path, data: ReportData, pictures: Iterable[PictureSet] = ()) -> None:
+def write_report(
+    path: Path, data: ReportData, pictures: Iterable[PictureSet] = (), advice: Sequence[tuple[str, Markup]] = ()
+) -> None:
     """Writes the report of a build, replacing the file in one step.
 
     Args:
         path: The HTML file; its folder is created if missing.
         data: Everything but the pictures.
         pictures: Sets to show side by side, in order; may be a generator, so that only one is in memory.
+        advice: Label of each held-out scene, and what it should be rendered with, as HTML.
     """
     held_out = [scene.label for scene in data.scenes if scene.held_out]
     measured = [m for m in data.measurements if m.scene in held_out]
@@ -61,6 +65,7 @@ def write_report(path: Path, data: ReportData, pictures: Iterable[PictureSet] = 
             legend=charts.legend([m.technique for m in summary.compared(data.measurements)]),
             training=charts.training_chart(data.training),
             plates=plates(pictures),
+            advice=advice,
             not_run=_not_run(data.measurements),
             largest_gap=max((c.gap for c in data.certificates), default=0.0),
             provenance=json.dumps(data.provenance, indent=2, sort_keys=True, default=str),

@@ -86,6 +86,13 @@ BOUNDS: Final[dict[str, Bound]] = {
         "two roundings a factor instead of one, up to 1e-7 a fragment, and `n T <= 94`.",
     ),
     "stochastic": _picture(5e-7, "The same samples by the same hash: only the mean's sums are rounded."),
+    "wavelet": _picture(
+        1e-5,
+        "Sums of up to 100 absorbances, added and subtracted level by level: a few roundings of 2^-24 of an optical "
+        "depth of up to 550, which the exponential damps.",
+    ),
+    "bevy": _ORDERED,
+    "storm-rules": _ORDERED,
     "moment.arithmetic": _picture(
         1e-4, "The shader's arithmetic on lists that no camera sees, of depths from 1e-30 to 1e4 m."
     ),

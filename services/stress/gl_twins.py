@@ -10,17 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labeller import reference
+from renderer.csr import offsets_of
 from renderer.reference import (
     adaptive,
+    bevy,
     depth_peeling,
     dual_depth_peeling,
     exact,
     moment,
     multilayer,
     stochastic,
+    storm_rules,
+    wavelet,
     weighted_average,
     weighted_blended,
 )
+from renderer.reference.arrivals import arriving
 from renderer.techniques import (
     TECHNIQUES,
     Adaptive,
@@ -31,8 +36,10 @@ from renderer.techniques import (
     WeightedBlended,
     technique,
 )
+from renderer.techniques.bevy import POOL as BEVY_POOL
 from renderer.techniques.binned import DEFAULT_BINS
-from renderer.techniques.ordered import Ordered, capture_ordered
+from renderer.techniques.ordered import EnginePool, Ordered, capture_ordered
+from renderer.techniques.storm_rules import POOL as STORM_POOL
 from schemas.fragments import FragmentDump
 from schemas.tail import TailName
 from services.stress.findings import Options
@@ -72,17 +79,22 @@ class Truth:
         return self._ordered
 
     def in_order(
-        self, twin: Callable[[NDArray[np.int64], NDArray[np.uint32], NDArray[np.float32], NDArray[np.uint8]], Floats]
+        self,
+        twin: Callable[[NDArray[np.int64], NDArray[np.uint32], NDArray[np.float32], NDArray[np.uint8]], Floats],
+        pool: EnginePool | None = None,
     ) -> Floats:
         """float64 [P, 3] of a twin that reads fragments in the order of submission; empty where not compared.
 
         Args:
             twin: Takes offsets int64 [P+1], packed colours uint32 [N], depths float32 [N] and backgrounds uint8 [P, 3],
                 and returns linear RGB float64 [P, 3].
+            pool: Of all pixels, compared or not: what it has no room for is lost.
         """
-        found, counts = self.ordered, self.dump.counts
-        kept = np.repeat(counts > 0, np.diff(found.offsets))
-        return twin(self.dump.offsets, found.packed[kept], found.depth[kept], self.dump.background)
+        found = self.ordered if pool is None else arriving(self.ordered, pool.slots * self.dump.pixels)
+        counts = np.diff(found.offsets)
+        compared = self.dump.counts > 0
+        kept = np.repeat(compared, counts)
+        return twin(offsets_of(counts * compared), found.packed[kept], found.depth[kept], self.dump.background)
 
     def hybrid(self, k: NDArray[np.integer], tail: TailName) -> Floats:
         """float64 [P, 3], the pixels with k core fragments and a tail (METHOD.md section 2); NaN if not compared.
@@ -138,6 +150,9 @@ def unbounded(options: Options) -> list[Unbounded]:
         "multilayer": lambda truth: truth.in_order(multilayer.picture),
         "adaptive": lambda truth: truth.in_order(adaptive.picture),
         "stochastic": lambda truth: stochastic.picture(truth.dump),
+        "wavelet": lambda truth: wavelet.picture(truth.dump),
+        "bevy": lambda truth: truth.in_order(bevy.picture, BEVY_POOL),
+        "storm-rules": lambda truth: truth.in_order(storm_rules.picture, STORM_POOL),
     }
     found = [
         Unbounded(name, technique(name), twins.get(name, lambda truth: exact.picture(truth.dump)), name)

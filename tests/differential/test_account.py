@@ -121,6 +121,9 @@ GEOMETRY: Mapping[str, Mapping[str, int]] = {
     "multilayer": {"count": 1, "capture": 1},
     "adaptive": {"count": 1, "capture": 1},
     "stochastic": {"samples": 1, "blend": 1},
+    "wavelet": {"count": 1, "coefficients": 1, "blend": 1},
+    "bevy": {"count": 1, "capture": 1},
+    "storm-rules": {"count": 1, "capture": 1},
 }
 
 
@@ -159,6 +162,9 @@ def resolved(counts: Counts, name: str) -> dict[str, int]:
         "stochastic": 16 * pixels + 4 * occupied,
         "binned": sums_of(DEFAULT_BINS) * (4 * pixels + occupied) // 5,
         "moment": 16 * counts.in_tiles + 4 * occupied,
+        "wavelet": 16 * counts.in_tiles + 4 * occupied,
+        "bevy": runs + 12 * total,
+        "storm-rules": runs + 12 * int(np.minimum(counts.dump.counts, 8).sum()),
     }[name]
     stored = 8 * counts.deep if name == "sbuffer" else 0
     return {"pixels": pixels, "loaded_bytes": 4 * pixels + loaded, "stored_bytes": 16 * pixels + stored}
@@ -193,6 +199,13 @@ def closed_forms(counts: Counts, found: Counted, name: str) -> dict[str, dict[st
             "blend": blended(total, 16, 28 * total, 16 * pixels),
             "resolve": resolved(counts, name),
         }
+    if name == "wavelet":
+        return {
+            "count": with_range,
+            "coefficients": blended(total, 68, 8 * total, 68 * pixels),
+            "blend": blended(total, 16, 72 * total, 16 * pixels),
+            "resolve": resolved(counts, name),
+        }
     if name == "stochastic":
         blend = blended(total, 20, 32 * total, 0)
         return {"samples": {"cleared_bytes": 52 * pixels}, "blend": blend, "resolve": resolved(counts, name)}
@@ -202,7 +215,7 @@ def closed_forms(counts: Counts, found: Counted, name: str) -> dict[str, dict[st
     if name == "abuffer-array":
         stored = {"atomics": total, "stored_bytes": 8 * total, "loaded_bytes": 0}
         return {"count": {"atomics": total}, "array": stored, "resolve": resolved(counts, name)}
-    if name in ("sbuffer", "multilayer", "adaptive"):
+    if name in ("sbuffer", "multilayer", "adaptive", "bevy", "storm-rules"):
         words = 2 if name == "sbuffer" else 3
         captured = {"atomics": total, "stored_bytes": 4 * words * total, "loaded_bytes": 0, "cleared_bytes": 0}
         return {

@@ -1,4 +1,4 @@
-"""The capture in order of submission, and `multilayer` and `adaptive` against their float64 twins on it."""
+"""The capture in order of submission, and the techniques that depend on it against their float64 twins."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from support.scenes import SIZE, VIEW, shells
 from renderer.bands import row_bands
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
-from renderer.reference import adaptive, multilayer
-from renderer.techniques import Adaptive, Budget, Multilayer, SBuffer, Technique, bands
+from renderer.reference import adaptive, bevy, multilayer, storm_rules
+from renderer.reference.arrivals import arriving
+from renderer.techniques import Adaptive, Bevy, Budget, Multilayer, SBuffer, StormRules, Technique, bands
 from renderer.techniques.bands import Part
-from renderer.techniques.ordered import Ordered, capture_ordered
+from renderer.techniques.ordered import EnginePool, Ordered, capture_ordered
 from renderer.techniques.runs import Runs
 from schemas.fragments import FragmentDump
 from schemas.limits import LIMITS
@@ -90,7 +91,9 @@ def test_order_of_arrival_in_the_pool_does_not_matter(
         assert np.array_equal(getattr(again, field), getattr(fragments, field)), field
 
 
-@pytest.mark.parametrize("technique", [Multilayer(), Adaptive()], ids=lambda technique: technique.name)
+@pytest.mark.parametrize(
+    "technique", [Multilayer(), Adaptive(), Bevy(), StormRules()], ids=lambda technique: technique.name
+)
 def test_bands_of_rows_give_the_same_picture__technique(
     frame: Frame, fragments: Ordered, monkeypatch: pytest.MonkeyPatch, technique: Technique
 ) -> None:
@@ -118,6 +121,66 @@ def test_adaptive_equals_its_twin__nodes(frame: Frame, dump: FragmentDump, fragm
     assert np.array_equal(rendered.k, np.minimum(dump.counts, nodes))
 
 
+ENGINES: dict[str, tuple[Technique, ModuleType]] = {
+    "bevy": (Bevy(), bevy),
+    "storm-rules": (StormRules(), storm_rules),
+}
+
+
+def with_slots(monkeypatch: pytest.MonkeyPatch, name: str, slots: int) -> None:
+    module = f"renderer.techniques.{name.replace('-', '_')}"
+    monkeypatch.setattr(f"{module}.POOL", EnginePool(slots, pixel_bytes=1))
+
+
+@pytest.mark.parametrize("slots", [1, 2, 100])
+@pytest.mark.parametrize("name", ENGINES)
+def test_an_engine_equals_its_twin__name_slots(
+    frame: Frame, dump: FragmentDump, fragments: Ordered, monkeypatch: pytest.MonkeyPatch, name: str, slots: int
+) -> None:
+    technique, twin = ENGINES[name]
+    with_slots(monkeypatch, name, slots)
+    left = arriving(fragments, slots * frame.pixels)
+    assert len(left.rank) == min(slots * frame.pixels, dump.total)
+    rendered = technique.render(frame, Budget(0))
+    np.testing.assert_allclose(rendered.linear, picture(twin, left, dump, 8), atol=1e-6, rtol=0)
+    assert ("arrivals" in rendered.passes) == (slots < 100)
+    assert np.array_equal(rendered.k, np.minimum(dump.counts, 8))
+
+
+def test_a_full_pool_loses_the_last_triangles_and_cuts_one_by_pixel(frame: Frame, fragments: Ordered) -> None:
+    slots = 2 * frame.pixels
+    left = arriving(fragments, slots)
+    lost = len(fragments.rank) - slots
+    last = np.sort(fragments.rank)[slots - 1]
+    assert lost > 0
+    assert left.rank.max() == last
+    cut = pixels_of(fragments.offsets)[fragments.rank == last]
+    kept = pixels_of(left.offsets)[left.rank == last]
+    assert 0 < len(kept) < len(cut)
+    assert kept.max() < np.setdiff1d(cut, kept).min()
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_a_pixel_of_no_more_than_eight_is_exact_while_the_pool_lasts__name(
+    frame: Frame, dump: FragmentDump, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    with_slots(monkeypatch, name, 100)
+    exact = SBuffer().render(frame, Budget(0)).linear
+    untied = untied_pixels(dump).reshape(exact.shape[:2])
+    few = (dump.counts <= 8).reshape(exact.shape[:2]) & untied
+    found = ENGINES[name][0].render(frame, Budget(0)).linear
+    assert few.sum() > 100
+    np.testing.assert_allclose(found[few], exact[few], atol=1e-6, rtol=0)
+    assert np.abs(found - exact)[~few].max() > 0.01
+
+
+def untied_pixels(dump: FragmentDump) -> np.ndarray:
+    """Pixels without fragments of equal depth, which engines order otherwise."""
+    pixel = pixels_of(dump.offsets)
+    tied = (np.diff(dump.depth) == 0) & (np.diff(pixel) == 0)
+    return np.bincount(pixel[1:][tied], minlength=dump.pixels) == 0
+
+
 @pytest.mark.parametrize("technique", [Multilayer(16), Adaptive(16)], ids=lambda technique: technique.name)
 def test_a_node_for_every_fragment_is_exact__technique(frame: Frame, dump: FragmentDump, technique: Technique) -> None:
     exact = SBuffer().render(frame, Budget(0)).linear
@@ -132,12 +195,18 @@ def test_four_layers_are_nearer_to_exact_than_two(frame: Frame) -> None:
     assert four < 0.5 * two
 
 
-@pytest.mark.parametrize("technique", [Multilayer(), Adaptive()], ids=lambda technique: technique.name)
+@pytest.mark.parametrize("technique", [Multilayer(), Adaptive(), StormRules()], ids=lambda technique: technique.name)
 def test_a_picture_is_identical_from_frame_to_frame__technique(
     gl: moderngl.Context, frame: Frame, technique: Technique
 ) -> None:
     again = Frame(GpuScene(gl, shells()), VIEW, *SIZE)
     assert np.array_equal(technique.render(frame, Budget(0)).linear, technique.render(again, Budget(0)).linear)
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_memory_is_what_the_engine_takes__name(frame: Frame, name: str) -> None:
+    rendered = ENGINES[name][0].render(frame, Budget(0))
+    assert rendered.compared_bytes == {"bevy": 52, "storm-rules": 196}[name] * frame.pixels
 
 
 @pytest.mark.parametrize("technique", [Multilayer(), Adaptive()], ids=lambda technique: technique.name)

@@ -28,6 +28,9 @@ READ = {
     "weighted-blended": 0,
     "moment": 0,
     "stochastic": 0,
+    "wavelet": 0,
+    "bevy": TOTALS,
+    "storm-rules": TOTALS,
 }
 
 

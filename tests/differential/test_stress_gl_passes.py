@@ -99,6 +99,9 @@ def test_a_layer_stays_in_front_of_a_merged_one_as_deep_as_it(gl: moderngl.Conte
         ("multilayer", "common/composite.glsl", "return root * root;", "return pow(root, vec3(2.001));"),
         ("stochastic", "stochastic/coverage.glsl", "255u", "254u"),
         ("moment", "moment/reconstruct.glsl", "OVERESTIMATION * mass", "0.26 * mass"),
+        ("wavelet", "wavelet/blend.frag", "(1.0 - t)", "(1.001 - t)"),
+        ("bevy", "bevy/resolve.frag", "else if (is_nearer(kept[0], carried))", "else if (false)"),
+        ("storm-rules", "storm-rules/resolve.frag", "j = found.y; j > found.x", "j = found.y - 1u; j > found.x"),
     ],
 )
 def test_a_broken_shader_is_a_violation__technique(

@@ -15,8 +15,17 @@ from labeller.curves import composite
 from renderer.capture import capture
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
-from renderer.reference import moment, stochastic, weighted_average, weighted_blended
-from renderer.techniques import Budget, Moment, Stochastic, Technique, WeightedAverage, WeightedBlended, technique
+from renderer.reference import moment, stochastic, wavelet, weighted_average, weighted_blended
+from renderer.techniques import (
+    Budget,
+    Moment,
+    Stochastic,
+    Technique,
+    Wavelet,
+    WeightedAverage,
+    WeightedBlended,
+    technique,
+)
 from renderer.techniques.skips import EMPTY_TILES
 from schemas.fragments import FragmentDump
 from schemas.limits import LIMITS
@@ -50,8 +59,9 @@ CASES: dict[str, tuple[Technique, Twin, float]] = {
         lambda dump: stochastic.picture(dump, 32, 2**32 - 1),
         5e-7,
     ),
+    "wavelet": (Wavelet(), wavelet.picture, 1e-6),
 }
-NAMES = ["weighted-average", "weighted-blended", "moment", "stochastic"]
+NAMES = ["weighted-average", "weighted-blended", "moment", "stochastic", "wavelet"]
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -106,6 +116,7 @@ def test_nothing_in_sight_is_the_background(gl: moderngl.Context, name: str) -> 
         ("weighted-blended", ["opaque", "sums", "resolve"], 20, 0),
         ("moment", ["opaque", "count", "moments", "blend", "resolve"], 48, 0),
         ("stochastic", ["opaque", "samples", "blend", "resolve"], 20, 4 * 8 * SIZE[0] * SIZE[1]),
+        ("wavelet", ["opaque", "count", "coefficients", "blend", "resolve"], 96, 0),
     ],
 )
 def test_every_pass_and_byte_is_reported(

@@ -25,13 +25,14 @@ from renderer.dump_pixels import DumpReader
 from renderer.exr import read_exr
 from schemas.colour import display8
 from schemas.problem import ExitCode, Problem
-from services.dashboard import scene_views, sides
+from services import scene_views
+from services.dashboard import sides
 from services.dashboard.compare import Comparer
 from services.dashboard.measured import history, of_version
 from services.dashboard.pixels import RULE_TITLES
-from services.dashboard.scene_views import views
 from services.kept import Kept
 from services.report import colours
+from services.scene_views import views
 from services.stages.pictures import counts_map, read_png, write_png
 
 

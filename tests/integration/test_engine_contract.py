@@ -202,7 +202,7 @@ def test_a_claim_stays_within_the_process_s_own_slots(engine: Engine) -> None:
     assert registered is not None
     assert registered._worker_concurrency == 0
     slots = {"render": 2}
-    system.limit_slots(slots)
+    system.steer_claims(engine.database, slots)
     for number in range(3):
         engine.enqueue(f"t/{number}", priority=3 - number)
     queue = system_database.get_queue("render")
@@ -211,6 +211,31 @@ def test_a_claim_stays_within_the_process_s_own_slots(engine: Engine) -> None:
     assert claimed == ["t/2", "t/1"], "by priority, as many as there are slots"
     slots.clear()
     assert system_database.get_queue("render")._worker_concurrency == 0  # type: ignore[union-attr]
+
+
+def test_a_queue_is_claimed_from_only_while_something_waits_in_it(engine: Engine) -> None:
+    from dbos._dbos import _get_dbos_instance
+
+    system_database = _get_dbos_instance()._sys_db
+    assert system_database.dequeue_scopes("render") == [None]
+    system.steer_claims(engine.database, {"render": 1})
+    assert system_database.dequeue_scopes("render") == []
+    engine.enqueue()
+    assert system_database.dequeue_scopes("render") == [None]
+    assert system_database.dequeue_scopes("label") == []
+    engine.claimed_by("somebody")
+    assert system_database.dequeue_scopes("render") == []
+
+
+def test_whether_something_waits_is_read_from_an_index(tmp_path: Path) -> None:
+    database = open_database(f"sqlite:///{tmp_path / 'queues.sqlite'}")
+    system.migrate(database)
+    asked = system.waiting(database).params(queue="render")
+    statement = str(asked.compile(database.engine, compile_kwargs={"literal_binds": True}))
+    with database.read() as connection:
+        plan = str(connection.exec_driver_sql(f"explain query plan {statement}").all())
+    database.close()
+    assert "USING COVERING INDEX" in plan, "half a million waiting rows must not slow it down"
 
 
 def test_prefixes_match_whole_parts_only(engine: Engine) -> None:

@@ -1,4 +1,4 @@
-"""What `multilayer` and `adaptive` promise for any list of fragments, on their float64 twins."""
+"""What techniques that depend on the order of submission promise for any list of fragments, on their twins."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from renderer.reference import adaptive, multilayer
+from renderer.reference import adaptive, bevy, multilayer, storm_rules
 from schemas.colour import decode_gamma2
 
 BACKGROUND = np.array([[200, 120, 40]], np.uint8)
@@ -151,3 +151,30 @@ def test_the_inner_node_that_goes_takes_the_least_area(pixel: Fragments) -> None
     (gone,) = set(before) - set(everything.keys)
     # The choice is made in float32.
     assert area[before.index(gone) - 1] <= area.min() * (1.0 + 1e-5) + 1e-12
+
+
+@given(pixel=fragments(most=20), nodes=st.integers(1, 9))
+def test_storm_composites_its_last_fragments_and_no_other(pixel: Fragments, nodes: int) -> None:
+    last = Fragments(pixel.depth[-nodes:], pixel.packed[-nodes:])
+    untied = len(np.unique(last.depth)) == len(last.depth)
+    if untied:
+        np.testing.assert_allclose(picture(storm_rules.picture, pixel, nodes), exact(last), atol=1e-12)
+
+
+@given(pixel=fragments(most=20), nodes=st.integers(1, 9))
+def test_bevy_composites_every_fragment_once_and_the_farthest_in_order(pixel: Fragments, nodes: int) -> None:
+    walked = pixel.keys[::-1]
+    order = bevy.composited(walked, nodes)
+    assert sorted(order) == sorted(word for _, word in walked)
+    far = sorted(((z, -(word >> 24)) for z, word in walked))[-nodes:]
+    depth_of: dict[int, set[tuple[float, int]]] = {}
+    for z, word in walked:
+        depth_of.setdefault(word, set()).add((z, -(word >> 24)))
+    assert all(key in depth_of[word] for key, word in zip(far, order[-nodes:], strict=True))
+
+
+@given(pixel=fragments(most=20), nodes=st.integers(1, 9))
+def test_bevy_is_exact_when_fragments_arrive_from_back_to_front(pixel: Fragments, nodes: int) -> None:
+    arriving = pixel.front_to_back().backwards()
+    if len(np.unique(pixel.depth)) == len(pixel.depth):
+        np.testing.assert_allclose(picture(bevy.picture, arriving, nodes), exact(pixel), atol=1e-12)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from support.dumps import dump_of
 
-from renderer.reference import moment, stochastic, weighted_average, weighted_blended
+from renderer.reference import moment, stochastic, wavelet, weighted_average, weighted_blended
 from schemas.colour import decode_gamma2
 from schemas.fragments import FragmentDump
 
@@ -23,8 +23,9 @@ PICTURES: dict[str, Picture] = {
     "weighted-blended": lambda dump: weighted_blended.picture(dump, 0.5, 600.0),
     "moment": moment.picture,
     "stochastic": stochastic.picture,
+    "wavelet": wavelet.picture,
 }
-EXACT_COVERAGE = ["weighted-blended", "moment", "stochastic"]
+EXACT_COVERAGE = ["weighted-blended", "moment", "stochastic", "wavelet"]
 
 every = pytest.mark.parametrize("name", PICTURES)
 

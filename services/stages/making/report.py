@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from renderer.context import describe, gl_context
 from schemas.measurement import Measurement, ReportData
 from services import summary
+from services.advice.gathered import of_measurements
+from services.advice.page import part
 from services.report import Picture, PictureSet, write_report
 from services.stages.desk import PAGE, Desk, load_facts
 from services.stages.inputs import EvaluateFacts
@@ -68,8 +71,18 @@ def write(path: Path, data: dict[str, Any], shown: Sequence[Evaluation]) -> Path
             "versions": library_versions(),
         }
     )
-    write_report(path, complete, _pictures(shown))
+    write_report(path, complete, _pictures(shown), list(_advice(complete)))
     return path
+
+
+def _advice(data: ReportData) -> Iterator[tuple[str, Markup]]:
+    """What each held-out scene should be rendered with, by what was measured."""
+    label = "" if data.registry is None else data.registry.reference
+    for scene in data.scenes:
+        measured = [(m, label) for m in data.measurements if m.scene == scene.label]
+        advice = of_measurements(scene.label, measured) if scene.held_out else None
+        if advice is not None:
+            yield scene.label, part(advice)
 
 
 def _pictures(shown: Sequence[Evaluation]) -> Iterator[PictureSet]:

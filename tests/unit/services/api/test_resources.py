@@ -295,3 +295,23 @@ def test_a_view_without_direction_is_refused_at_once(shared: Api, eye: list[floa
     answer = shared.post("/v1/jobs", json=_job(scenes=[{"scene": "scn_" + "0" * 32, "views": [view]}]))
     assert answer.status_code == 422
     assert "no direction" in answer.text
+
+
+def test_a_scene_is_advised_on_by_what_was_measured_on_it(api: Api) -> None:
+    scene = api.scene()
+    answer = api.get(f"/v1/scenes/{scene}/advice")
+    assert (answer.status_code, answer.json()["type"]) == (404, "/v1/problems/not-found")
+    dear = measurement(total_fragments=2000, total_bytes=6000, mse=1e-4)
+    api.service.measured.record("evaluate/a", [dear], {"bottles": api.service.scenes.get(scene).digest}, None, None)
+    fits = api.get(f"/v1/scenes/{scene}/advice").json()["choice"]
+    assert (fits["verdict"], fits["chosen"]["technique"], fits["size"]) == (
+        "exact",
+        "sbuffer",
+        {"width": 10, "height": 10},
+    )
+    tight = api.get(f"/v1/scenes/{scene}/advice?memory=8KiB").json()
+    assert (tight["choice"]["verdict"], tight["choice"]["chosen"]["technique"]) == ("technique", "kbuffer")
+    assert "Use kbuffer (budget 1, density tail)" in tight["text"][0]
+    large = api.get(f"/v1/scenes/{scene}/advice?memory=8KiB&size=1920x1080").json()
+    assert large["choice"]["verdict"] == "none"
+    assert api.get(f"/v1/scenes/{scene}/advice?memory=8").status_code == 422
