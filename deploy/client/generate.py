@@ -41,7 +41,7 @@ from schemas.tail import (
 HOME: Final = Path(__file__).parent
 PYTHON: Final = HOME / "python" / "diaphane_client" / "constants.py"
 HEADER: Final = HOME / "c" / "diaphane_bundle.h"
-TYPESCRIPT: Final = HOME / "web" / "src" / "generated.ts"
+TYPESCRIPT: Final = HOME / "web" / "packages" / "core" / "src" / "generated.ts"
 
 CUTS: Final[dict[str, tuple[int | float, str]]] = {
     "FULL": (FULL, "What a bin's count says of this many fragments or more: such a bin is never in a core."),

@@ -1,12 +1,15 @@
-"""Fixtures of the dashboard's tests: services with something of everything and with nothing."""
+"""Fixtures of the dashboard's tests, and of the browser client's: services, and sources with their packages."""
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from support.api import Api
 from support.dashboard import Shown, fill
+from support.web import install
 
 
 @pytest.fixture(scope="module")
@@ -32,3 +35,11 @@ def url(api: Api) -> Iterator[str]:
     """Where `api` is served."""
     with api.served() as address:
         yield address
+
+
+@pytest.fixture(scope="session")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A copy of the browser client's sources with their locked packages."""
+    root = tmp_path_factory.mktemp("web")
+    yield install(root)
+    shutil.rmtree(root)

@@ -20,7 +20,7 @@ _SPEC.loader.exec_module(generate)
 
 SOURCES = [
     path
-    for folder in ("c", "python/diaphane_client", "web/src")
+    for folder in ("c", "python/diaphane_client", *(f"web/packages/{name}/src" for name in ("core", "three", "demo")))
     for path in sorted((CLIENT / folder).rglob("*"))
     if path.suffix in {".c", ".h", ".py", ".ts", ".wgsl"}
 ]

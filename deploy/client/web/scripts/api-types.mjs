@@ -1,4 +1,4 @@
-// Writes src/api.ts: the types of docs/openapi.json that the page uses, and those that they need.
+// Writes packages/core/src/api.ts: the types of docs/openapi.json that the page uses, and those that they need.
 import { readFileSync, writeFileSync } from "node:fs";
 
 const WANTED = ["ModelPage", "PointerRecord", "ProblemDocument", "VersionRecord"];
@@ -33,4 +33,4 @@ for (const name of needs) {
   texts.push(`/** ${description.split("\n")[0]} */\nexport interface ${name} {\n${members.join("\n")}\n}\n`);
 }
 const head = "// Written by scripts/api-types.mjs of docs/openapi.json: `npm run types`.\n\n";
-writeFileSync(process.argv[2] ?? new URL("../src/api.ts", here), head + texts.join("\n"));
+writeFileSync(process.argv[2] ?? new URL("../packages/core/src/api.ts", here), head + texts.join("\n"));

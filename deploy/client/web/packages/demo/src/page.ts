@@ -1,8 +1,7 @@
 // The page's elements, and what is written into them. Text only: nothing that a server or a file says becomes markup.
 
-import { psnr } from "./passes/screen";
+import { psnr, Trouble } from "@diaphane/core";
 import type { Figures, Report } from "./stage";
-import { Trouble } from "./trouble";
 
 /** An element of the page. */
 export function at<E extends HTMLElement>(id: string): E {

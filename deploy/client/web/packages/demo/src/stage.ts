@@ -1,14 +1,22 @@
 // The canvas: what is shown on it, drawn anew where something has changed, one picture at a time.
 
-import type { Bundle } from "./bundle";
-import { type View, framingView } from "./camera";
-import type { Gpu } from "./gpu";
-import { Geometry } from "./passes/geometry";
-import { type Mode, Screen, meanSquaredError } from "./passes/screen";
-import { type Counted, Renderer, type Technique } from "./renderer";
-import type { Scene } from "./scene";
-import { Trouble } from "./trouble";
-import { Abandoned, Work } from "./work";
+import {
+  Abandoned,
+  type Bundle,
+  type Counted,
+  framingView,
+  Geometry,
+  type Gpu,
+  meanSquaredError,
+  type Mode,
+  Renderer,
+  type Scene,
+  Screen,
+  type Technique,
+  Trouble,
+  type View,
+  Work,
+} from "@diaphane/core";
 
 /** What one wants to see. */
 export interface Wanted {

@@ -1,6 +1,6 @@
 // Pointer, wheel and keys on the stage.
 
-import { moved, turned } from "./camera";
+import { moved, turned } from "@diaphane/core";
 import type { Stage } from "./stage";
 
 const STEP = 6;

@@ -3,9 +3,24 @@
 
 import { type Document, type Material, type Primitive, type Texture, WebIO, Logger } from "@gltf-transform/core";
 
-import { type Mat4, type Vec3, cofactors, cross, product, scaled, subtract, transformed, unit } from "./math";
-import { Trouble } from "./trouble";
-import { type Batch, type Image, type Layer, type Scene, encodeGamma2, orient } from "./scene";
+import {
+  type Batch,
+  cofactors,
+  cross,
+  encodeGamma2,
+  type Image,
+  type Layer,
+  type Mat4,
+  orient,
+  product,
+  scaled,
+  type Scene,
+  subtract,
+  transformed,
+  Trouble,
+  unit,
+  type Vec3,
+} from "@diaphane/core";
 
 const MOST_VERTICES = 4_000_000;
 const MOST_CORNERS = 6 * MOST_VERTICES;

@@ -1,19 +1,24 @@
 // The demo: puts scene, model, techniques and controls together.
 
-import shells from "../samples/shells.glb?url";
-import shelf from "../samples/shelf.glb?url";
-import type { Bundle } from "./bundle";
-import type { View } from "./camera";
-import { Gpu } from "./gpu";
+import shells from "../../../samples/shells.glb?url";
+import shelf from "../../../samples/shelf.glb?url";
+import {
+  type Bundle,
+  Gpu,
+  type Memory,
+  type Mode,
+  Registry,
+  selfTest,
+  SignedOut,
+  type Technique,
+  TECHNIQUES,
+  Trouble,
+  type View,
+} from "@diaphane/core";
 import { readGlb } from "./gltf";
 import { attach } from "./hands";
 import { at, busy, clear, fill, say, show, wait } from "./page";
-import { selfTest } from "./passes/network";
-import type { Mode } from "./passes/screen";
-import { type Memory, Registry, SignedOut } from "./registry";
-import { TECHNIQUES, type Technique } from "./renderer";
 import { type Report, Stage } from "./stage";
-import { Trouble } from "./trouble";
 
 const SAMPLES = { "glass shells": shells, "a shelf of bottles": shelf };
 const NAMES: Readonly<Record<Technique, string>> = {

@@ -1,11 +1,10 @@
 import { readFileSync } from "node:fs";
 import { expect, it, vi } from "vitest";
 
-import { framingView, turned } from "../src/camera";
+import { framingView, length, subtract, turned } from "@diaphane/core";
 import { readGlb } from "../src/gltf";
-import { length, subtract } from "../src/math";
 
-const sample = (name: string) => new Blob([readFileSync(new URL(`../samples/${name}.glb`, import.meta.url))]);
+const sample = (name: string) => new Blob([readFileSync(new URL(`../../../samples/${name}.glb`, import.meta.url))]);
 
 function glb(json: unknown): Blob {
   let text = JSON.stringify(json);
