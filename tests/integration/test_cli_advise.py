@@ -42,7 +42,7 @@ def test_it_says_what_to_use_and_leaves_a_page(scene: Path, folder: Path, capsys
     page = (folder / "page.html").read_text(encoding="utf-8")
     assert "the least error that fits" in told
     assert f"diaphane render {scene} --views views.json -t " in told
-    assert "<svg" in page
+    assert '<script type="application/json">' in page
     assert page.count("data:image/webp") == 5
     assert "http://" not in page.replace("http://www.w3.org", "")
 

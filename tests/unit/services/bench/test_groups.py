@@ -155,7 +155,7 @@ def test_a_budget_that_holds_every_fragment_is_not_called_exact() -> None:
 
 def test_the_page_shows_its_charts_without_a_network() -> None:
     html = page(result(), ["time-error"], "Two versions.")
-    assert html.count('<script type="application/json">') == 3
+    assert html.count('<script type="application/json">') == 4
     assert "vega.expressionInterpreter" in html
     assert not re.search(r'(src|href)="https?://', html)
     assert "@import" not in html
