@@ -41,7 +41,7 @@ from services.bench.cells import bundle_of
 from services.bench.groups import said_alpha
 from services.bench.options import parse_budgets, parse_sizes
 from services.bench.subject import Subject
-from services.stress.gl_drivers import GPU
+from stress.gl_drivers import GPU
 
 MODULE = "benchmarks.gpu"
 MINUTES = 9.0

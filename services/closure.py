@@ -22,7 +22,7 @@ from typing import Final
 
 from services.versions import ROOT
 
-PACKAGES: Final = ("schemas", "renderer", "labeller", "trainer", "services")
+PACKAGES: Final = ("schemas", "renderer", "labeller", "trainer", "stress", "services")
 
 _OWN = rf"(?:{'|'.join(PACKAGES)})(?:\.\w+)*"
 _NOT_RUN = re.compile(r"^([ \t]*)if TYPE_CHECKING:\n(?:\1[ \t]+.*\n|[ \t]*\n)*", re.MULTILINE)

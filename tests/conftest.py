@@ -20,7 +20,7 @@ from support.s3 import S3Server, environment
 from renderer.context import gl_context
 from services.settings import Settings
 from services.storage import Storage, open_storage
-from services.stress.threads import one_thread
+from stress.threads import one_thread
 
 Machine = Callable[[str], Storage]
 """Opens one storage as a machine of the given name does."""

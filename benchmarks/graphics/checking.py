@@ -17,9 +17,9 @@ from schemas.problem import ExitCode, Problem
 from schemas.tail import TailName
 from schemas.view import View
 from services.local_scenes import LocalScene
-from services.stress.findings import Options
-from services.stress.gl_cases import Case, Scenery
-from services.stress.gl_twins import Truth, unbounded
+from stress.findings import Options
+from stress.gl_cases import Case, Scenery
+from stress.gl_twins import Truth, unbounded
 
 PIXELS = 400
 """That are compared."""

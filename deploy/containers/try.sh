@@ -33,7 +33,7 @@ steps() {
     local inside=(chroot "$folder" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8)
     mkdir "$folder/source"
     cp -r "$here" "$folder/containers"
-    (cd "$source" && cp -r pyproject.toml README.md LICENSE schemas renderer labeller trainer services "$folder/source")
+    (cd "$source" && cp -r pyproject.toml README.md LICENSE schemas renderer labeller trainer stress services "$folder/source")
     say "wheel.sh"
     "${inside[@]}" /containers/wheel.sh /source /wheels
     say "packages.sh $role"

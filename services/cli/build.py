@@ -88,7 +88,7 @@ def _show(options: BuildOptions, result: BuildResult) -> None:
     if held_out:
         table = Table(title=f"Held out: {', '.join(result.held_out)}", title_justify="left")
         for heading in ("F / (W H)", "technique"):
-            table.add_column(heading)
+            table.add_column(heading, no_wrap=True)
         for heading in ("MSE x1e-5", "/ VKB", "PSNR dB", "FLIP", "ms"):
             table.add_column(heading, justify="right")
         for row in summary.rows(held_out):

@@ -15,8 +15,8 @@ from renderer.allocation.prices import RANKS, ranks_of
 from renderer.bin_pass import Binned
 from renderer.programs import Programs
 from schemas.tail import BINNED_TAILS, TAILS, TailName
-from services.stress.fills import price_cases
-from services.stress.gl_allocation import packed_bins, placed_cores
+from stress.fills import price_cases
+from stress.gl_allocation import packed_bins, placed_cores
 
 Ranks = NDArray[np.uint8]
 NAMES = list(price_cases(np.random.default_rng(0), 1, 8))

@@ -29,7 +29,7 @@ from schemas.limits import Limits
 from schemas.problem import Problem
 from schemas.scene import SceneArrays
 from schemas.view import View
-from services.stress import gl_stacks as stacks
+from stress import gl_stacks as stacks
 
 EXACT: dict[str, tuple[Technique, ModuleType]] = {
     technique.name: (technique, twin)

@@ -33,7 +33,7 @@ from schemas.bundle import (
     ParityReport,
     load_manifest,
 )
-from services.stress.gl_drivers import ZINK
+from stress.gl_drivers import ZINK
 from trainer.half import half_outputs
 from trainer.parity import torch_outputs
 

@@ -27,8 +27,8 @@ from renderer.hidden import hidden_fragments
 from renderer.programs import SHADERS, Defines, expand
 from renderer.techniques import TECHNIQUES, Budget, KBufferDeep, Needs, technique
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, MAX_EXPONENT, NO_TAIL, TAIL_NAMES, TAILS, TailKind
-from services.stress.gl_stacks import VIEW as STACKS
-from services.stress.gl_stacks import extreme_stacks, size, stack_scene
+from stress.gl_stacks import VIEW as STACKS
+from stress.gl_stacks import extreme_stacks, size, stack_scene
 
 STAGES = (".vert", ".frag", ".comp")
 FULLSCREEN = ("common/fullscreen.vert", "benchmark/empty.frag")

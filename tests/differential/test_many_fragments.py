@@ -22,7 +22,7 @@ from renderer.techniques import TECHNIQUES, Adaptive, Budget, Multilayer, Needs,
 from renderer.techniques.ordered import capture_ordered
 from schemas.fragments import FragmentDump
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, TAILS, TailName
-from services.stress.gl_stacks import STRIDE, VIEW, extreme_stacks, size, stack_scene
+from stress.gl_stacks import STRIDE, VIEW, extreme_stacks, size, stack_scene
 
 LAYERS = 4096
 FEWER_LAYERS = 96

@@ -11,10 +11,10 @@ import pytest
 
 from labeller.allocation import Allocation
 from labeller.hull import Hulls
-from services.stress import allocations
-from services.stress.bounds import BOUNDS
-from services.stress.findings import Options
-from services.stress.twins import exact_hull
+from stress import allocations
+from stress.bounds import BOUNDS
+from stress.findings import Options
+from stress.twins import exact_hull
 
 QUICK = Options(quick=True)
 

@@ -14,12 +14,12 @@ from renderer.allocation.cuts import Cuts
 from renderer.depth_bins import bin_form, keep_bins, kept_room, place_of
 from renderer.features import FEATURES, SUMS, derive, gather
 from schemas.tail import BIN_LIMIT, BINNED_TAILS, MOST_BINS, TAILS
-from services.stress import curves, features, fills
-from services.stress.bounds import BOUNDS
-from services.stress.cases import bin_cases, curve_cases, dump_of, some_list
-from services.stress.findings import Finding, Options, Row
-from services.stress.suites import Listed, rows_of
-from services.stress.twins import features64, network64, sums64
+from stress import curves, features, fills
+from stress.bounds import BOUNDS
+from stress.cases import bin_cases, curve_cases, dump_of, some_list
+from stress.findings import Finding, Options, Row
+from stress.suites import Listed, rows_of
+from stress.twins import features64, network64, sums64
 
 QUICK = Options(quick=True)
 

@@ -16,7 +16,7 @@ from renderer.reference import moment
 from renderer.techniques import TECHNIQUES, Budget, KBufferDynamic, KBufferOptimal, Needs
 from renderer.techniques.ordered import Ordered, capture_ordered
 from schemas.tail import TAILS, TailKind
-from services.stress import (
+from stress import (
     gl,
     gl_allocation,
     gl_bins,
@@ -28,11 +28,11 @@ from services.stress import (
     gl_refused,
     gl_techniques,
 )
-from services.stress.findings import Broken, Finding, Options
-from services.stress.gl_cases import EVERY_BUDGET, Case, make_case, sceneries
-from services.stress.gl_drivers import GPU, LLVMPIPE, ZINK
-from services.stress.gl_twins import Truth, unbounded
-from services.stress.predictors import networks, real_features
+from stress.findings import Broken, Finding, Options
+from stress.gl_cases import EVERY_BUDGET, Case, make_case, sceneries
+from stress.gl_drivers import GPU, LLVMPIPE, ZINK
+from stress.gl_twins import Truth, unbounded
+from stress.predictors import networks, real_features
 
 QUICK = Options(quick=True)
 CASES = {scenery.name: scenery for scenery in sceneries(QUICK)}

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from labeller.curves import composite
-from services.stress import predictors, refusals, search
-from services.stress.bounds import BOUNDS
-from services.stress.findings import Finding, NotRun, Options, Row
-from services.stress.predictors import NEEDED, Rows, form, networks, predicted64, real_features
+from stress import predictors, refusals, search
+from stress.bounds import BOUNDS
+from stress.findings import Finding, NotRun, Options, Row
+from stress.predictors import NEEDED, Rows, form, networks, predicted64, real_features
 from trainer.weights import Weights
 
 QUICK = Options(quick=True)

@@ -30,7 +30,7 @@ from renderer.techniques.skips import EMPTY_TILES
 from schemas.fragments import FragmentDump
 from schemas.limits import LIMITS
 from schemas.problem import Problem
-from services.stress import gl_stacks as stacks
+from stress import gl_stacks as stacks
 
 Twin = Callable[[FragmentDump], NDArray[np.float64]]
 

@@ -144,7 +144,7 @@ def test_a_comparison_ends_with_one_ranking_and_a_contact_sheet(
     table = out[out.index("Ranked by error") :].splitlines()
     assert "means over 2 pictures" in table[0]
     assert [line.split()[0] for line in table[2:5]] == ["1", "2", "3"]
-    assert "exact (S-buffer) (sbuffer)" in table[2]
+    assert "exact (sbuffer)" in table[2]
     assert table[5:] == ["Contact sheet: q-sheet.1.png", "Contact sheet: q-sheet.2.png"]
 
 

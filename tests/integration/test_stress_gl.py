@@ -7,9 +7,9 @@ from support.drivers import lavapipe_installed
 
 from renderer.techniques import TECHNIQUES
 from schemas.tail import BINNED_TAILS, TAILS
-from services.stress import gl
-from services.stress.findings import Finding, NotRun, Options, Row
-from services.stress.gl_drivers import ZINK
+from stress import gl
+from stress.findings import Finding, NotRun, Options, Row
+from stress.gl_drivers import ZINK
 
 PASSES = (
     *("capture.bits", "range", "bins.kept", "bins.counts"),

@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 from renderer.features import FEATURES, derive, gather
 from schemas.fragments import FragmentDump
 from schemas.tail import METRICS, TAIL_NAMES, MetricName, TailName
-from services.stress import search
-from services.stress.bounds import BOUNDS
-from services.stress.cases import dump_of
-from services.stress.features import EVERY, SPREADS
-from services.stress.predictors import networks, real_features
-from services.stress.search import list_finding, worst_features, worst_list
-from services.stress.threads import one_thread
-from services.stress.twins import features64, sums64
+from stress import search
+from stress.bounds import BOUNDS
+from stress.cases import dump_of
+from stress.features import EVERY, SPREADS
+from stress.predictors import networks, real_features
+from stress.search import list_finding, worst_features, worst_list
+from stress.threads import one_thread
+from stress.twins import features64, sums64
 
 level = st.one_of(st.integers(0, 255), st.sampled_from([0, 1, 254, 255]))
 alpha = st.one_of(st.integers(1, 254), st.sampled_from([1, 128, 254]))

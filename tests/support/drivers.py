@@ -20,8 +20,8 @@ from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.techniques.chain import one_pass_available
 from schemas.tail import BINNED_TAILS
-from services.stress import gl_drivers
-from services.stress.gl_drivers import Driver
+from stress import gl_drivers
+from stress.gl_drivers import Driver
 from support.scenes import SIZE, VIEW, shells
 
 ROOT = Path(__file__).parents[2]

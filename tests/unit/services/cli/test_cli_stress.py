@@ -13,8 +13,8 @@ import pytest
 from labeller.curves import Curves
 from schemas.problem import ExitCode
 from services.cli.app import run
-from services.stress import cases, curves, fills
-from services.stress.suites import Listed
+from stress import cases, curves, fills
+from stress.suites import Listed
 
 
 @pytest.fixture

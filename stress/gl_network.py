@@ -16,13 +16,13 @@ from renderer.features import FEATURES, SUMS, derive
 from renderer.techniques import KBufferDeep
 from schemas.bundle import GLSL, MANIFEST, ParityReport, Provenance, TailSpec, file_spec, gain_outputs, load_manifest
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, DENSITY_G, TAILS, TailName
-from services.stress.features import FRONTS, KEPT, SPREADS, in_steps
-from services.stress.findings import Finding, Options, compared
-from services.stress.gl_bins import Judge, counted_bins
-from services.stress.gl_bounds import bound_of
-from services.stress.gl_cases import Case, thinned
-from services.stress.predictors import Rows, feature_cases, predicted64
-from services.stress.twins import features64, network64, sums64
+from stress.features import FRONTS, KEPT, SPREADS, in_steps
+from stress.findings import Finding, Options, compared
+from stress.gl_bins import Judge, counted_bins
+from stress.gl_bounds import bound_of
+from stress.gl_cases import Case, thinned
+from stress.predictors import Rows, feature_cases, predicted64
+from stress.twins import features64, network64, sums64
 from trainer.bundle import Description, write_bundle
 from trainer.export_shader import shader_source
 from trainer.glsl_network import glsl_outputs

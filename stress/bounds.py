@@ -7,7 +7,7 @@ from typing import Final
 
 from numpy.typing import ArrayLike
 
-from services.stress.findings import INFORMATION, Bound, Finding, compared
+from stress.findings import INFORMATION, Bound, Finding, compared
 
 PIXEL_FLOOR: Final = 1e-9
 """Squared errors below this are no error that a pixel can show: a 120th of a step of an 8-bit channel."""

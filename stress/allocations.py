@@ -20,11 +20,11 @@ from labeller.selection import END, Histogram, ascending_keys
 from labeller.streaming import allocate_bands
 from schemas.fragments import FragmentDump
 from schemas.tail import RANGE_TILE, TAIL_NAMES
-from services.stress.bounds import PIXEL_FLOOR, counted, within
-from services.stress.cases import Case, curve_cases, dump_of, random_dump, some_list
-from services.stress.findings import Finding, Options, worst_of
-from services.stress.threads import one_thread
-from services.stress.twins import exact_hull
+from stress.bounds import PIXEL_FLOOR, counted, within
+from stress.cases import Case, curve_cases, dump_of, random_dump, some_list
+from stress.findings import Finding, Options, worst_of
+from stress.threads import one_thread
+from stress.twins import exact_hull
 
 _EXACT: Final = 64  # hulls of longer lists are not made in rational arithmetic
 _SMALL: Final = 40  # fragments up to which a full search is made

@@ -42,8 +42,8 @@ from renderer.techniques.ordered import EnginePool, Ordered, capture_ordered
 from renderer.techniques.storm_rules import POOL as STORM_POOL
 from schemas.fragments import FragmentDump
 from schemas.tail import TailName
-from services.stress.findings import Options
-from services.stress.gl_cases import Case, thinned
+from stress.findings import Options
+from stress.gl_cases import Case, thinned
 
 Floats = NDArray[np.float64]
 Twin = Callable[["Truth"], Floats]
@@ -124,7 +124,7 @@ class Unbounded:
         name: As in the table, with its parameters.
         technique: Renders.
         twin: float64 [P, 3], linear RGB.
-        bound: Its key in `services.stress.gl_bounds.BOUNDS`.
+        bound: Its key in `stress.gl_bounds.BOUNDS`.
     """
 
     name: str

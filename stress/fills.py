@@ -14,10 +14,10 @@ from renderer.allocation.cuts import FULL, MOST_CORE, Cuts, Events, events_of, s
 from renderer.allocation.fill import budget_fill
 from renderer.allocation.prices import LEAST_PRICE, PRICE_STEPS, RANKS, ranks_of
 from schemas.tail import DENSITY_G
-from services.stress.allocations import edge_budgets
-from services.stress.bounds import counted, within
-from services.stress.findings import Finding, Options, worst_of
-from services.stress.threads import one_thread
+from stress.allocations import edge_budgets
+from stress.bounds import counted, within
+from stress.findings import Finding, Options, worst_of
+from stress.threads import one_thread
 
 Counts = NDArray[np.int32]
 Numbers = NDArray[np.float32]

@@ -20,11 +20,11 @@ from schemas.tail import (
     TAILS,
     TailName,
 )
-from services.stress.findings import Finding, compared
-from services.stress.gl_bounds import bound_of
-from services.stress.gl_capture import Geometry
-from services.stress.gl_cases import Case, thinned
-from services.stress.twins import sums64
+from stress.findings import Finding, compared
+from stress.gl_bounds import bound_of
+from stress.gl_capture import Geometry
+from stress.gl_cases import Case, thinned
+from stress.twins import sums64
 
 Floats = NDArray[np.float64]
 

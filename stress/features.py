@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from renderer.features import FEATURES, SUMS, derive, gather
 from schemas.tail import BINNED_TAILS, MOST_BINS, TAILS, TailName
-from services.stress.bounds import counted, within
-from services.stress.cases import Case, curve_cases
-from services.stress.findings import Finding, Options, worst_of
-from services.stress.twins import features64, sums64
+from stress.bounds import counted, within
+from stress.cases import Case, curve_cases
+from stress.findings import Finding, Options, worst_of
+from stress.twins import features64, sums64
 
 EVERY: Final[TailName] = "binned-16"
 """The tail that fills every sum and feature."""

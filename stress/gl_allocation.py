@@ -15,10 +15,10 @@ from renderer.allocation.prices import ranks_of
 from renderer.bin_pass import CORE_WORDS, CURSOR_BITS, Binned
 from renderer.programs import Programs
 from schemas.tail import BINNED_TAILS, TAILS, TailName
-from services.stress.allocations import edge_budgets
-from services.stress.fills import bin_counts, price_cases, whole_bins
-from services.stress.findings import Finding, Options, compared
-from services.stress.gl_bounds import bound_of
+from stress.allocations import edge_budgets
+from stress.fills import bin_counts, price_cases, whole_bins
+from stress.findings import Finding, Options, compared
+from stress.gl_bounds import bound_of
 
 PATH = "allocation"
 

@@ -16,8 +16,8 @@ from renderer.programs import Programs
 from schemas.fragments import FragmentDump
 from schemas.scene import Batch, SceneArrays
 from schemas.view import View
-from services.stress.findings import Options
-from services.stress.gl_stacks import (
+from stress.findings import Options
+from stress.gl_stacks import (
     VIEW,
     Stack,
     awkward_stacks,
@@ -51,7 +51,7 @@ class Scenery:
         size: Width and height, pixels.
         stacks: Names of the stacks, from left to right; empty where there are none.
         corners: 3 or 4: of a polygon.
-        budgets: Which F are tried; keys of `services.stress.gl_techniques.BUDGETS`.
+        budgets: Which F are tried; keys of `stress.gl_techniques.BUDGETS`.
         deep: Whether pixels have thousands of fragments: too many for a pass a layer, and bounds are others.
     """
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from schemas.problem import Problem
-from services.stress import report
-from services.stress.findings import INFORMATION, Broken, Finding, Measure, NotRun, compared, worst_of
+from stress import report
+from stress.findings import INFORMATION, Broken, Finding, Measure, NotRun, compared, worst_of
 
 
 def row(absolute: float, relative: float = 0.0, bound: float = 1.0, measure: Measure = "absolute") -> Finding:

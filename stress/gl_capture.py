@@ -15,9 +15,9 @@ from renderer.tile_range import tile_grid, tile_ranges
 from schemas.colour import decode_gamma2
 from schemas.fragments import FragmentDump
 from schemas.tail import RANGE_TILE
-from services.stress.findings import Finding, compared
-from services.stress.gl_bounds import BOUNDS
-from services.stress.gl_cases import Case, Scenery
+from stress.findings import Finding, compared
+from stress.gl_bounds import BOUNDS
+from stress.gl_cases import Case, Scenery
 
 Floats = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from schemas.problem import ExitCode, Problem
-from services.stress import bounds, gl_bounds
-from services.stress.findings import Bound, Broken, Finding, NotRun, Row
+from stress import bounds, gl_bounds
+from stress.findings import Bound, Broken, Finding, NotRun, Row
 
 HEADINGS: Final = ("path", "case", "absolute", "relative", "where", "bound", "verdict")
 MEASURED: Final = "measured"

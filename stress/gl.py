@@ -1,7 +1,7 @@
 """Every GLSL pass on every GL driver that this machine has, against float64 (METHOD.md section 6).
 
 A process has one GL context, and its driver is chosen by the environment, so each driver has a child process
-(`services.stress.gl_child`); they run side by side. One that crashes, or is silent for too long, is a violation that
+(`stress.gl_child`); they run side by side. One that crashes, or is silent for too long, is a violation that
 names what it was doing.
 """
 
@@ -18,11 +18,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from services.stress import gl_refused
-from services.stress.findings import Broken, Finding, NotRun, Options, Row
-from services.stress.gl_bounds import BOUNDS
-from services.stress.gl_child import KINDS
-from services.stress.gl_drivers import GPU, LLVMPIPE, ZINK, environment, gpu_here
+from stress import gl_refused
+from stress.findings import Broken, Finding, NotRun, Options, Row
+from stress.gl_bounds import BOUNDS
+from stress.gl_child import KINDS
+from stress.gl_drivers import GPU, LLVMPIPE, ZINK, environment, gpu_here
 
 SILENCE = 180.0
 """Seconds without a line after which a child hangs: the slowest picture takes a few on one slow core."""
@@ -133,7 +133,7 @@ def _children(options: Options, runtime: Path) -> list[Child]:
     return [
         Child(
             driver.name,
-            [sys.executable, "-m", "services.stress.gl_child", driver.name, *arguments],
+            [sys.executable, "-m", "stress.gl_child", driver.name, *arguments],
             environment(driver, runtime, threads),
         )
         for driver in drivers

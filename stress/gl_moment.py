@@ -16,9 +16,9 @@ from renderer.techniques.moment import BIAS, OVERESTIMATION
 from schemas.colour import decode_gamma2
 from schemas.fragments import FragmentDump
 from schemas.tail import MAX_EXPONENT
-from services.stress.cases import dump_of
-from services.stress.findings import Bound, Finding, Options, compared
-from services.stress.gl_bounds import BOUNDS
+from stress.cases import dump_of
+from stress.findings import Bound, Finding, Options, compared
+from stress.gl_bounds import BOUNDS
 
 # One invocation sums a list in its order, as blending does, and composites it.
 _MAIN = """

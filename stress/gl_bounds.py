@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from services.stress.findings import INFORMATION, Bound
+from stress.findings import INFORMATION, Bound
 
 PICTURE_FLOOR: Final = 1e-3
 """Linear light: relative errors of darker values are relative to this."""

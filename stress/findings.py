@@ -1,6 +1,6 @@
 """What a stress suite reports: how far a fast path was from float64, and how far it may be.
 
-A suite is a function `run(options: Options) -> Iterator[Row]`; `services.stress.suites` lists them.
+A suite is a function `run(options: Options) -> Iterator[Row]`; `stress.suites` lists them.
 """
 
 from __future__ import annotations

@@ -16,11 +16,11 @@ from labeller.curves import composite, error_curves
 from renderer.allocation.fill import budget_fill, paper_fill
 from renderer.features import gather
 from schemas.problem import Problem
-from services.stress.bounds import counted
-from services.stress.cases import dump_of, some_list
-from services.stress.features import EVERY
-from services.stress.findings import Finding, Options, Row, worst_of
-from services.stress.predictors import networks, real_features
+from stress.bounds import counted
+from stress.cases import dump_of, some_list
+from stress.features import EVERY
+from stress.findings import Finding, Options, Row, worst_of
+from stress.predictors import networks, real_features
 
 PATH: Final = "refused.arrays"
 _WORDS: Final = ("finite", "positive", "NaN", "numbers")

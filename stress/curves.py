@@ -18,10 +18,10 @@ from renderer.tile_range import pixel_ranges
 from schemas.colour import linear_to_srgb
 from schemas.fragments import FragmentDump
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, DENSITY_G, MAX_EXPONENT, METRICS, TAILS, MetricName, TailName
-from services.stress.bounds import counted, within
-from services.stress.cases import LONGEST, Case, curve_cases, dump_of
-from services.stress.findings import Finding, Options, worst_of
-from services.stress.twins import exact_transmittance, extended_composite
+from stress.bounds import counted, within
+from stress.cases import LONGEST, Case, curve_cases, dump_of
+from stress.findings import Finding, Options, worst_of
+from stress.twins import exact_transmittance, extended_composite
 
 _WHOLE: Final = 64  # of lists up to this long every k is compared, of longer ones a sample
 

@@ -20,12 +20,12 @@ from labeller.curves import error_curves
 from schemas.bundle import FEATURE_LIMIT
 from schemas.fragments import FragmentDump
 from schemas.tail import DENSITY_G, METRICS, TAIL_NAMES, MetricName, TailName
-from services.stress.bounds import within
-from services.stress.cases import dump_of, some_list
-from services.stress.curves import reference_errors
-from services.stress.findings import Finding, NotRun, Options, Row
-from services.stress.predictors import NEEDED, Predict, form, networks, predicted64, real_features
-from services.stress.threads import one_thread
+from stress.bounds import within
+from stress.cases import dump_of, some_list
+from stress.curves import reference_errors
+from stress.findings import Finding, NotRun, Options, Row
+from stress.predictors import NEEDED, Predict, form, networks, predicted64, real_features
+from stress.threads import one_thread
 
 if TYPE_CHECKING:
     from trainer.weights import Weights

@@ -26,14 +26,14 @@ from renderer.techniques import (
 from renderer.techniques.base import ChainForm
 from renderer.techniques.chain import one_pass_available
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, TAIL_NAMES, TailName
-from services.stress.fills import whole_bins
-from services.stress.findings import Finding, Options, compared
-from services.stress.gl_bounds import bound_of
-from services.stress.gl_cases import Case
-from services.stress.gl_moment import DELICATE
-from services.stress.gl_network import Networks
-from services.stress.gl_stacks import ILL_CONDITIONED
-from services.stress.gl_twins import Truth, Unbounded, unbounded
+from stress.fills import whole_bins
+from stress.findings import Finding, Options, compared
+from stress.gl_bounds import bound_of
+from stress.gl_cases import Case
+from stress.gl_moment import DELICATE
+from stress.gl_network import Networks
+from stress.gl_stacks import ILL_CONDITIONED
+from stress.gl_twins import Truth, Unbounded, unbounded
 
 BOUNDED = tuple(name for name, entry in TECHNIQUES.items() if entry.family == "bounded")
 _LEARNED = tuple(name for name in BOUNDED if TECHNIQUES[name].needs_bundle)

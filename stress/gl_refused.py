@@ -8,8 +8,8 @@ from pathlib import Path
 
 from renderer.scene import load_scene
 from schemas.problem import Problem
-from services.stress.findings import Finding
-from services.stress.gl_bounds import BOUNDS
+from stress.findings import Finding
+from stress.gl_bounds import BOUNDS
 
 _HEAD = '#usda 1.0\n(\n    defaultPrim = "World"\n    metersPerUnit = 1\n    upAxis = "Y"\n)\ndef Xform "World"\n{\n'
 _FACES = "int[] faceVertexCounts = [3]\n int[] faceVertexIndices = [0, 1, 2]\n"

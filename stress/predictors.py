@@ -1,6 +1,6 @@
 """A network in numpy, torch and onnxruntime against float64, on features made to break it; and features as float16.
 
-The GLSL form is with the other shaders, in `services.stress.gl`.
+The GLSL form is with the other shaders, in `stress.gl`.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from renderer.allocation.prices import gain_prices, ranks_of
 from renderer.features import FEATURES, derive, gather
 from schemas.bundle import FEATURE_LIMIT, ONNX, gain_outputs
 from schemas.tail import TAILS
-from services.stress.bounds import counted, within
-from services.stress.cases import random_dump
-from services.stress.features import EVERY
-from services.stress.findings import Finding, NotRun, Options, Row, worst_of
-from services.stress.twins import network64
+from stress.bounds import counted, within
+from stress.cases import random_dump
+from stress.features import EVERY
+from stress.findings import Finding, NotRun, Options, Row, worst_of
+from stress.twins import network64
 
 if TYPE_CHECKING:
     from trainer.weights import Weights

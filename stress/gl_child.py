@@ -1,4 +1,4 @@
-"""The GL suite in a process that has one GL driver: `python -m services.stress.gl_child DRIVER [--quick] [--seed N]`.
+"""The GL suite in a process that has one GL driver: `python -m stress.gl_child DRIVER [--quick] [--seed N]`.
 
 Every line of its output is a JSON object: `at` says what it is doing, `row` is a row of the table, and `digest` the
 hash of a case's fragments, which the parent compares between drivers.
@@ -23,11 +23,11 @@ import numpy as np
 from renderer.context import describe, gl_context
 from renderer.programs import Programs
 from schemas.problem import Problem
-from services.stress import gl_allocation, gl_bins, gl_capture, gl_moment, gl_network, gl_techniques
-from services.stress.findings import Broken, Finding, NotRun, Options, Row
-from services.stress.gl_cases import Scenery, make_case, sceneries
-from services.stress.gl_drivers import DRIVERS, Driver
-from services.stress.predictors import networks, real_features
+from stress import gl_allocation, gl_bins, gl_capture, gl_moment, gl_network, gl_techniques
+from stress.findings import Broken, Finding, NotRun, Options, Row
+from stress.gl_cases import Scenery, make_case, sceneries
+from stress.gl_drivers import DRIVERS, Driver
+from stress.predictors import networks, real_features
 
 KINDS: dict[str, type[Row]] = {kind.__name__: kind for kind in (Finding, NotRun, Broken)}
 """Rows by the name that a line gives."""

@@ -8,10 +8,10 @@ from importlib import import_module
 from typing import Final
 
 from schemas.problem import Problem
-from services.stress import bounds, gl_bounds
-from services.stress.findings import Broken, NotRun, Options, Row, Suite
+from stress import bounds, gl_bounds
+from stress.findings import Broken, NotRun, Options, Row, Suite
 
-_OURS: Final = ("schemas", "renderer", "labeller", "trainer", "services")
+_OURS: Final = ("schemas", "renderer", "labeller", "trainer", "stress", "services")
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class Listed:
     """A suite, not imported before it runs.
 
     Attributes:
-        name: Of the module in `services.stress` that has its `run`.
+        name: Of the module in `stress` that has its `run`.
         paths: The fast paths that its rows are of.
     """
 
@@ -32,7 +32,7 @@ class Listed:
         Raises:
             ImportError: A library is not installed.
         """
-        run: Suite = import_module(f"services.stress.{self.name}").run
+        run: Suite = import_module(f"stress.{self.name}").run
         return run
 
 
