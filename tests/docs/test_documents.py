@@ -29,6 +29,7 @@ DISTRIBUTIONS = {
     "moderngl_window": "moderngl-window",
     "prometheus_client": "prometheus-client",
     "pydantic_settings": "pydantic-settings",
+    "vl_convert": "vl-convert-python",
 }
 """Import names that differ from the name of the distribution."""
 
