@@ -50,7 +50,7 @@ format: setup ## rewrite the sources in the house style
 docs: ## the documents as a site, with the Python reference: build/site/index.html
 	@scripts/docs.sh
 
-lock: ## all locks anew from pyproject.toml (needs uv)
+lock: ## all locks anew from pyproject.toml (with the uv of .venv, if there is no other)
 	scripts/lock.sh
 
 clean: ## remove the environment, caches and the samples; keeps .diaphane

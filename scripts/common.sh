@@ -29,3 +29,26 @@ apt_install() { # why, packages...
     "${waiting[@]}" "${root[@]}" env DEBIAN_FRONTEND=noninteractive sh -c \
         'apt-get update -qq && apt-get install -y -qq --no-install-recommends "$@" >/dev/null' sh "$@"
 }
+
+# What `pip config list` prints, on standard input -> the variables that make uv, which reads nothing of pip's, take
+# packages from the same places, as NAME=VALUE. The environment comes before the files, [install] before [global].
+uv_settings() {
+    local listed option variable between section value words
+    listed=$(cat)
+    while read -r option variable between; do
+        for section in :env: install global; do
+            value=$(sed -nE "s/^$section\.$option='(.*)'\$/\1/p" <<<"$listed")
+            [ -n "$value" ] || continue
+            read -ra words <<<"${value//\\n/ }" # several stand on a line each
+            (IFS=${between:- }; printf '%s=%s\n' "$variable" "${words[*]}")
+            break
+        done
+    done <<'END'
+index-url UV_DEFAULT_INDEX
+extra-index-url UV_INDEX
+find-links UV_FIND_LINKS ,
+trusted-host UV_INSECURE_HOST
+no-index UV_NO_INDEX
+cert SSL_CERT_FILE
+END
+}

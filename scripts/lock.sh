@@ -4,6 +4,7 @@
 # the documents has its own (docs/requirements.lock): nothing else is installed with it.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
+PATH=$PATH:$PWD/.venv/bin # has uv, where there is no other
 # shellcheck source=deploy/containers/role.sh
 . deploy/containers/role.sh
 

@@ -32,17 +32,40 @@ check_space() {
         die "about $NEEDED_GB GB are needed to install, and $free GB are free here: make room, then run this again."
 }
 
+pip=(.venv/bin/python -m pip --quiet --disable-pip-version-check)
+
+# In half of pip's time: it downloads side by side. The lock has it, so that its hash is checked as any other's.
+with_uv() {
+    local variable value
+    while IFS='=' read -r variable value; do
+        # What is set for uv itself stands.
+        [ -n "${!variable:-}" ] || export "$variable=$value"
+    done < <("${pip[@]}" config list | uv_settings)
+    # As pip chooses between indexes: what is installed is settled by hashes.
+    export UV_INDEX_STRATEGY=unsafe-best-match
+    # A cache for this once, where files can be linked instead of copied; who uses uv anyway has one.
+    command -v uv >/dev/null || export UV_CACHE_DIR=${UV_CACHE_DIR:-$PWD/.venv/cache}
+    "${pip[@]}" install --no-cache-dir --no-compile --require-hashes --no-deps \
+        -r <(awk '/^[^ ]/ { is_uv = /^uv==/ } is_uv' requirements.lock) &&
+        .venv/bin/uv pip install --quiet --python .venv/bin/python --require-hashes -r requirements.lock &&
+        .venv/bin/uv pip install --quiet --python .venv/bin/python --no-deps --no-build-isolation -e . &&
+        rm -rf .venv/cache
+}
+
+# As uv does, without compiling all that is never imported, which takes a third of the time.
+with_pip() {
+    "${pip[@]}" install --no-cache-dir --no-compile --require-hashes -r requirements.lock
+    "${pip[@]}" install --no-deps --no-build-isolation -e .
+}
+
 install_packages() {
     check_space
-    say "installing the locked dependencies (about 6.5 GB on disk on Linux x86-64)"
-    if command -v uv >/dev/null; then
-        uv pip install --quiet --python .venv/bin/python --require-hashes -r requirements.lock
-        uv pip install --quiet --python .venv/bin/python --no-deps --no-build-isolation -e .
-    else
-        # As uv does, without compiling all that is never imported, which takes a third of the time.
-        .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-cache-dir --no-compile --require-hashes \
-            -r requirements.lock
-        .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+    say "installing the locked dependencies: about 6.5 GB on disk on Linux x86-64, 5.5 of them PyTorch with CUDA, which"
+    say "training needs; all else works without it, below 1 GB: pip install '.[render]'"
+    if ! with_uv; then
+        say "uv could not install them, so pip does"
+        make_venv
+        with_pip
     fi
 }
 

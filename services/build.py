@@ -12,6 +12,7 @@ from schemas.licence import verdict
 from services import pipeline
 from services.flags import written
 from services.inline import InlineRunner
+from services.installed import require
 from services.local import open_local
 from services.local_datasets import write_dataset
 from services.measured import Measured
@@ -33,8 +34,9 @@ def build(options: BuildOptions, progress: Progress) -> BuildResult:
         progress: Where progress goes.
 
     Raises:
-        Problem: Bad input, no GL driver, or a check that does not hold.
+        Problem: Bad input, no GL driver, a package that is not installed, or a check that does not hold.
     """
+    require("render", "label", "train")
     started = time.monotonic()
     with open_local(options.state) as local:
         runner = InlineRunner(local.storage, local.registry, Measured(local.database), progress)

@@ -17,8 +17,11 @@ from services.cli.server import URL_VARIABLE
 from services.cli.state import DEFAULT_STATE, STATE_VARIABLE, StateOption
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from services.api.server import Server
     from services.service import Service
+    from services.tasks import Role
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 8035
 FIRST_KEY = "first"
@@ -30,14 +33,18 @@ def serve(
     host: Annotated[str, typer.Option("--host", help="Address to listen on.")] = DEFAULT_HOST,
     port: Annotated[int, typer.Option("--port", help="Port; 0: a free one.", min=0, max=65535)] = DEFAULT_PORT,
     roles: Annotated[
-        str, typer.Option("--roles", help="What it does itself, of jobs,render,label,train; 'none': the API only.")
-    ] = "jobs,render,label,train",
+        str | None,
+        typer.Option(
+            "--roles",
+            help="What it does itself, of jobs,render,label,train; 'none': the API only. Default: what is installed.",
+        ),
+    ] = None,
     state: StateOption = DEFAULT_STATE,
 ) -> None:
     """Serve the API, and do the work. Stop with Ctrl-C: what is under way continues at the next start."""
-    from services.cli.worker import parse_roles, shut_down, stop_on_signal
+    from services.cli.worker import shut_down, stop_on_signal
 
-    wanted = () if roles.strip() == "none" else parse_roles(roles)
+    wanted = _roles(roles)
     os.environ[STATE_VARIABLE] = str(state)
     from services.loading import uncollected
 
@@ -67,10 +74,39 @@ def serve(
             stack.callback(shut_down, runtime)
             stack.callback(listener.stop)  # no more requests before the work ends
         announce(host, listener.port)
+        if roles is None:
+            _announce_missing(wanted)
         while not stop.wait(0.5) and listener.is_alive():
             pass
     if not stop.is_set():
         raise Problem("The HTTP server ended by itself.", "Look into the log, and start it again.", ExitCode.TRY_AGAIN)
+
+
+def _roles(text: str | None) -> tuple[Role, ...]:
+    """What a server does itself.
+
+    Raises:
+        Problem: A role is unknown, or needs a package that is not installed.
+    """
+    from services.cli.worker import parse_roles
+    from services.installed import installed_roles, require
+
+    if text is None:
+        return installed_roles()
+    wanted = () if text.strip() == "none" else parse_roles(text)
+    require(*wanted)
+    return wanted
+
+
+def _announce_missing(roles: Sequence[Role]) -> None:
+    """Prints what this server leaves to other workers: jobs that need it wait for one."""
+    from services.installed import WORK, missing
+    from services.tasks import ROLES
+
+    for role in ROLES:
+        if role not in roles:
+            lacking = " and ".join(missing(role))
+            print(f"{WORK[role]} waits for a worker of the role {role}: {lacking} not installed here", flush=True)
 
 
 class _Listener(threading.Thread):

@@ -27,7 +27,10 @@ def worker(
     state: StateOption = DEFAULT_STATE,
 ) -> None:
     """Do the tasks of a service. Database and store are set by DIAPHANE_DATABASE and DIAPHANE_STORE."""
+    from services.installed import require
+
     wanted = parse_roles(roles)
+    require(*wanted)
     os.environ[STATE_VARIABLE] = str(state)
     from services.loading import uncollected
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import yaml
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parents[2]
 CONTAINERS = ROOT / "deploy" / "containers"
@@ -81,3 +84,42 @@ def declared(extras: tuple[str, ...]) -> set[str]:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     groups = [project["dependencies"], *(project["optional-dependencies"][extra] for extra in extras)]
     return {re.split(r"[\[<>=! ]", requirement)[0] for group in groups for requirement in group}
+
+
+def closure(*extras: str) -> set[str]:
+    """Distributions that an installation here with some extras consists of, from what each one installed asks for."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    groups = [project["dependencies"], *(project["optional-dependencies"][extra] for extra in extras)]
+    waiting = [(text, "") for group in groups for text in group]
+    found: set[tuple[str, str]] = set()
+    while waiting:
+        text, extra = waiting.pop()
+        asked = Requirement(text)
+        name = canonicalize_name(asked.name)
+        if asked.marker is not None and not asked.marker.evaluate({"extra": extra}):
+            continue
+        for part in ("", *asked.extras):
+            if (name, part) in found:
+                continue
+            found.add((name, part))
+            if name == project["name"]:
+                waiting += [(own, "") for own in project["optional-dependencies"].get(part, ())]
+            else:
+                waiting += [(own, part) for own in metadata.requires(name) or ()]
+    return {name for name, _ in found}
+
+
+BLOCK = 4096
+BYTECODE = 1.3
+"""Blocks of the bytecode of what pip installs and compiles, per block of its source: measured on the extra `render`."""
+
+
+def installed_bytes(names: Iterable[str]) -> float:
+    """What some distributions, as they are installed here, take up on a disk once they are compiled."""
+    sizes = [
+        (file.suffix, -(-(file.size or 0) // BLOCK) * BLOCK)
+        for name in names
+        for file in metadata.files(name) or ()
+        if file.suffix != ".pyc"
+    ]
+    return sum(size * (1.0 + BYTECODE * (suffix == ".py")) for suffix, size in sizes)

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
@@ -20,11 +20,16 @@ INHERITED = ("PATH", "LANG", "LD_LIBRARY_PATH", "COVERAGE_PROCESS_START")
 
 def missing_from(image: str) -> list[str]:
     """Import names of what is installed here and is not in an image."""
-    held = set(pins(CONTAINERS / f"requirements-{image}.lock")) | {"diaphane"}
+    return missing_beyond(set(pins(CONTAINERS / f"requirements-{image}.lock")))
+
+
+def missing_beyond(distributions: Set[str]) -> list[str]:
+    """Import names of what is installed here and is of none of some distributions, nor Diaphane's own."""
+    held = distributions | {"diaphane"}
     return sorted(
         name
-        for name, distributions in packages_distributions().items()
-        if not any(re.sub(r"[-_.]+", "-", found).lower() in held for found in distributions)
+        for name, providers in packages_distributions().items()
+        if not any(re.sub(r"[-_.]+", "-", found).lower() in held for found in providers)
     )
 
 
