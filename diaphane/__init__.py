@@ -13,11 +13,13 @@ if TYPE_CHECKING:
     from diaphane.picture import Picture
     from diaphane.scene import Scene, open
     from schemas.problem import Problem
+    from services.client import Client
 
 __all__ = [
     "Advised",
     "Allocations",
     "Built",
+    "Client",
     "Fragments",
     "Picture",
     "Problem",
@@ -32,6 +34,7 @@ _HOMES: Final = {
     "Advised": "diaphane.advice",
     "Allocations": "diaphane.fragments",
     "Built": "diaphane.building",
+    "Client": "services.client",
     "Fragments": "diaphane.fragments",
     "Picture": "diaphane.picture",
     "Problem": "schemas.problem",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from diaphane import shown
 from diaphane.scene import Scene
 from renderer.scene import LoadOptions
+from services import shown
 from services.advice import run, words
 from services.advice.amounts import DEFAULT_MEMORY, DEFAULT_SIZE, parse_frame, parse_memory
 from services.advice.options import AdviceOptions

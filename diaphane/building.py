@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from diaphane import shown
 from schemas.options import Options
+from services import shown
 from services.build import build as run
 from services.options import BuildOptions, asked
 from services.progress import make_progress

@@ -10,10 +10,11 @@ from typing import Concatenate, ParamSpec, Self
 from numpy.typing import ArrayLike
 
 import labeller
-from diaphane import shown
+from diaphane import figures
 from labeller.allocation import Allocation
 from labeller.api import fragments_of
 from schemas.fragments import FragmentDump
+from services import shown
 from services.summary import number
 from services.wording import counted
 
@@ -34,7 +35,7 @@ class Fragments(FragmentDump):
 
     def _repr_html_(self) -> str:
         counts = self.counts.reshape(self.height, self.width)
-        return shown.counts_figure(counts, int(counts.max(initial=0)), self._caption())
+        return figures.counts_figure(counts, int(counts.max(initial=0)), self._caption())
 
     def _caption(self) -> str:
         mean = self.total / max(self.pixels, 1)
@@ -61,7 +62,9 @@ class Allocations(list[Allocation]):
         ]
         most = max((int(one.k.max(initial=0)) for one in self), default=0)
         maps = (
-            shown.counts_figure(one.k.reshape(self.shape), most, f"{one.rule}, k at {counted(one.budget, 'fragments')}")
+            figures.counts_figure(
+                one.k.reshape(self.shape), most, f"{one.rule}, k at {counted(one.budget, 'fragments')}"
+            )
             for one in self
         )
         return shown.table(("budget", "used", "squared error", "lower bound", "proven"), rows) + "".join(maps)

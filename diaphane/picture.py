@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diaphane import shown
+from diaphane import figures
 from schemas.colour import display8
 from services.cli.lines import size
 from services.looks import title
@@ -54,10 +54,10 @@ class Picture:
         return f"<Picture {self._caption()}>"
 
     def _repr_html_(self) -> str:
-        return shown.figure(self.srgb, self._caption())
+        return figures.figure(self.srgb, self._caption())
 
     def _repr_png_(self) -> bytes:
-        return shown.png(self.srgb)
+        return figures.png(self.srgb)
 
     def _caption(self) -> str:
         cost = self.cost

@@ -7,13 +7,13 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Self
 
-from diaphane import shown
 from diaphane.fragments import Fragments
 from diaphane.picture import Picture
 from renderer.capture import capture
 from renderer.frame import Frame
 from renderer.scene import LoadOptions
 from schemas.glass import DEFAULT_GLASS
+from services import shown
 from services.local_scenes import LocalScene, as_usd
 from services.options import parse_tail
 from services.render_options import (

@@ -1,12 +1,10 @@
-"""HTML that objects show themselves with: tables and pictures, without styles or scripts of their own."""
+"""Pictures that objects show themselves with in notebooks."""
 
 from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Iterable, Sequence
 from html import escape
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,35 +45,3 @@ def counts_figure(counts: NDArray[np.integer], most: int, caption: str) -> str:
         caption: Plain text.
     """
     return figure(colours.apply(counts / max(most, 1), colours.COUNT), f"{caption}; colours: 0 to {most}")
-
-
-def table(headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """Rows under headings; None is a dash.
-
-    Args:
-        headings: Of the columns.
-        rows: Their values.
-    """
-    head = "".join(f"<th>{escape(heading)}</th>" for heading in headings)
-    body = "".join(f"<tr>{''.join(f'<td>{_cell(value)}</td>' for value in row)}</tr>" for row in rows)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-
-
-def facts(title: str, pairs: Iterable[tuple[str, Any]]) -> str:
-    """A heading over names and values.
-
-    Args:
-        title: Plain text.
-        pairs: Name and value.
-    """
-    rows = "".join(f"<tr><th>{escape(name)}</th><td>{_cell(value)}</td></tr>" for name, value in pairs)
-    return f"<strong>{escape(title)}</strong><table><tbody>{rows}</tbody></table>"
-
-
-def paragraphs(sentences: Iterable[str]) -> str:
-    """Plain texts, each as a paragraph."""
-    return "".join(f"<p>{escape(sentence)}</p>" for sentence in sentences)
-
-
-def _cell(value: Any) -> str:
-    return "–" if value is None else escape(str(value))
