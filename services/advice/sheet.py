@@ -12,7 +12,7 @@ from renderer import metrics
 from schemas.advice import Candidate
 from schemas.colour import display8
 from services.report import colours
-from services.report.pictures import data_uri, squared_error
+from services.report.pictures import data_uri, squared_error, worst_spot
 from services.summary import number
 
 if TYPE_CHECKING:
@@ -78,23 +78,9 @@ def sheet(measuring: Measuring, one: Candidate) -> Sheet:
     return Sheet(one.technique, tuple(lines))
 
 
-def worst_spot(error: NDArray[np.float64], spot: tuple[int, int] = SPOT) -> tuple[slice, slice]:
-    """The window of a picture with the largest sum of errors.
-
-    Args:
-        error: float64 [H, W], 0 or more.
-        spot: Rows and columns; smaller where the picture is.
-    """
-    rows, columns = (min(side, most) for side, most in zip(spot, error.shape, strict=True))
-    sums = np.pad(error.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
-    windows = sums[rows:, columns:] - sums[:-rows, columns:] - sums[rows:, :-columns] + sums[:-rows, :-columns]
-    y, x = (int(i) for i in np.unravel_index(np.argmax(windows), windows.shape))
-    return slice(y, y + rows), slice(x, x + columns)
-
-
 def _line(name: str, technique: str, mse: float, image: NDArray[np.uint8], exact: NDArray[np.uint8]) -> Line:
     error = squared_error(image, exact)
-    spot = worst_spot(error)
+    spot = worst_spot(error, SPOT)
     low, high = _ERRORS
     heat = colours.apply(np.log(np.maximum(error, low) / low) / np.log(high / low), colours.HEAT)
     share = float(error[spot].sum() / error.sum()) if error.any() else 0.0

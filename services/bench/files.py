@@ -24,7 +24,7 @@ def write_files(folder: Path, result: BenchResult) -> None:
         RESULT: result.model_dump_json(indent=1, exclude_defaults=True),
         **{f"{name}.vl.json": json.dumps(spec, indent=1) for name, spec in plots.items()},
         **{f"{name}.svg": svg(spec).rstrip() for name, spec in plots.items()},
-        PAGE: page(result, list(plots), check_same_code(result)),
+        PAGE: page(result, list(plots), check_same_code(result), folder),
     }
     for name, text in texts.items():
         with replacing(folder / name) as path:

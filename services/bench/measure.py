@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from renderer.exact_bytes import exact_bytes, fits
 from renderer.techniques import TECHNIQUES, Budget, Needs, Rendered, Technique, technique
 from schemas.bench import LOSSLESS, BenchCell, CellKey, Yardstick
+from schemas.colour import display8
 from schemas.problem import ExitCode, Problem
 from schemas.tail import DENSITY_G, TailName
+from services.bench.album import Album
 from services.bench.cells import FIXED, Bundle, fragments_within
 from services.bench.flicker import measure_flicker
 from services.bench.options import BenchOptions
@@ -41,11 +43,13 @@ class Bench:
         subject: The view.
         options: What was asked for.
         bundle: For the techniques that need one.
+        album: Keeps the pictures.
     """
 
     subject: Subject
     options: BenchOptions
     bundle: Bundle | None
+    album: Album | None = None
     _cells: dict[CellKey, BenchCell] = field(default_factory=dict)
     _runs: list[Run] = field(default_factory=list)
     _bytes: dict[CellKey, _Bytes] = field(default_factory=dict)
@@ -103,6 +107,8 @@ class Bench:
             return BenchCell(**about, problem=f"{wrong:,} pixels of the picture are no numbers")
         self._runs.append(run)
         self._bytes[key] = _Bytes(rendered.pixel_bytes, rendered.early_bytes, rendered.total_bytes)
+        if self.album is not None:
+            self.album.keep(key, display8(rendered.linear))
         facts, errors = self._seen[same] = self._facts(rendered), self.subject.errors(rendered)
         return BenchCell(**about, **facts, **self._judged(key, errors, bool(about.get("exact"))))
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import groupby
+from pathlib import Path
 
 from schemas.bench import BenchResult, BenchView
 from services.advice.gathered import of_bench
 from services.advice.page import part
 from services.bench.account import said_device
+from services.bench.album import sheet_of
 from services.bench.groups import (
     Row,
     group,
@@ -23,13 +25,14 @@ from services.report.page import environment
 from services.summary import UNFIT, said_unfit
 
 
-def page(result: BenchResult, plots: Sequence[str], mixed: str | None) -> str:
+def page(result: BenchResult, plots: Sequence[str], mixed: str | None, folder: Path | None = None) -> str:
     """HTML.
 
     Args:
         result: All that was measured.
         plots: Names of the files with plots.
         mixed: What to say if the results are of different sources.
+        folder: The output folder, if its pictures shall be shown.
     """
     groups = groups_of(result.views)
     factors = sorted({cell.budget_factor for view in result.views for cell in view.cells if cell.budget_factor})
@@ -46,6 +49,7 @@ def page(result: BenchResult, plots: Sequence[str], mixed: str | None) -> str:
             mixed=mixed,
             figures=figures,
             groups=shown,
+            pictures=lambda of: None if folder is None else sheet_of(folder, of.views),
             advice=[(each.title, part(of_bench(each.title, each.views))) for each in groups],
             plots=plots,
             charts=lambda of: [spec for cost in (TIME, MEMORY) if (spec := cost_chart(of, cost))],

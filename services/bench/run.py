@@ -25,6 +25,7 @@ from schemas.problem import ExitCode, Problem
 from schemas.scene import SceneArrays
 from schemas.view import View
 from schemas.work import Device
+from services.bench.album import Album
 from services.bench.cells import Bundle, bundle_of, planned
 from services.bench.groups import said_alpha
 from services.bench.kept import Kept
@@ -186,7 +187,7 @@ def _measure(
         progress.note(f"{where}: measured already")
         return
     load, start = os.getloadavg()[0], time.perf_counter()
-    marks, cells, n = _measured(subject, options, bundle, missing)
+    marks, cells, n = _measured(subject, options, bundle, missing, key)
     scene: SceneArrays = subject.gpu.scene
     view = BenchView(
         key=key,
@@ -217,7 +218,7 @@ def _measure(
 
 
 def _measured(
-    subject: Subject, options: BenchOptions, bundle: Bundle | None, keys: Sequence[CellKey]
+    subject: Subject, options: BenchOptions, bundle: Bundle | None, keys: Sequence[CellKey], place: str
 ) -> tuple[list[Yardstick], list[BenchCell], NDArray[np.integer]]:
     """Yardsticks and cells of a view, and its fragments of each pixel, int [P]."""
     try:
@@ -227,7 +228,8 @@ def _measured(
             raise
         counts = subject.frame().count()
         return [], without_pictures(keys, counts, problem), counts
-    return *Bench(subject, options, bundle).measure(keys), n
+    album = Album(options.out, place, subject.exact8)
+    return *Bench(subject, options, bundle, album).measure(keys), n
 
 
 def _key(place: _Place, options: BenchOptions) -> str:

@@ -46,7 +46,7 @@ class Cost:
     unit: str
 
 
-TIME: Final = Cost(lambda row: row.ms, "wall time of a frame", "ms")
+TIME: Final = Cost(lambda row: row.ms, "time of a frame", "ms")
 MEMORY: Final = Cost(lambda row: row.total_bytes and row.total_bytes / 2**20, "memory of all buffers", "MiB")
 
 

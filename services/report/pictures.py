@@ -99,6 +99,20 @@ def squared_error(image: NDArray[np.uint8], exact: NDArray[np.uint8]) -> NDArray
     return np.asarray(np.mean(difference * difference, axis=-1))
 
 
+def worst_spot(error: NDArray[np.float64], spot: tuple[int, int]) -> tuple[slice, slice]:
+    """The window of a picture with the largest sum of errors.
+
+    Args:
+        error: float64 [H, W], 0 or more.
+        spot: Rows and columns; smaller where the picture is.
+    """
+    rows, columns = (min(side, most) for side, most in zip(spot, error.shape, strict=True))
+    sums = np.pad(error.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    windows = sums[rows:, columns:] - sums[:-rows, columns:] - sums[rows:, :-columns] + sums[:-rows, :-columns]
+    y, x = (int(i) for i in np.unravel_index(np.argmax(windows), windows.shape))
+    return slice(y, y + rows), slice(x, x + columns)
+
+
 def data_uri(image: NDArray[np.uint8], quality: int) -> str:
     """A picture uint8 [H, W, 3] as a data URI (WebP, `quality` in percent).
 
