@@ -581,3 +581,21 @@ def test_of_a_traceback_in_the_log_only_the_error_is_shown(
     shown = capsys.readouterr().err.splitlines()
     assert "render of glass front: ValueError: bad luck" in shown
     assert not [line for line in shown if "boil" in line or "Traceback" in line]
+
+
+# The same client in a program
+
+
+def test_a_program_uploads_submits_and_waits(server: FakeServer, folder: Path) -> None:
+    usdz(folder)
+    server.checks = 2
+    with client(server) as asked:
+        scene = asked.scenes.add("glass.usdz", "cup")
+        assert (scene["state"], scene["name"]) == ("accepted", "cup")
+        job, is_new = asked.jobs.submit({"kind": "render", "scenes": [{"scene": scene["id"]}]})
+        assert is_new
+        assert asked.jobs.wait(job["id"])["state"] == "succeeded"
+        assert [one["id"] for one in asked.jobs.list()] == [job["id"]]
+        assert job["id"] in asked.jobs.list()._repr_html_()
+        assert asked.scenes.list() == [scene]
+        assert KEY not in repr(asked) + asked._repr_html_()
