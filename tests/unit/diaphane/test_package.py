@@ -7,20 +7,25 @@ import io
 import re
 import subprocess
 import sys
+from html import escape
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 from support import advice as stored
+from support.measured import example
 
 import diaphane
-from diaphane import Advised, Fragments, allocate
+from diaphane import Advised, Fragments, allocate, building
 from schemas.advice import Size
+from schemas.measurement import RegistryResult
 from schemas.problem import ExitCode, Problem
 from services.advice import run
 from services.advice.rules import advise as ruled
 from services.advice.words import sentences
+from services.options import BuildOptions
+from services.result import BuildResult
 
 RGBA = np.array([[200, 40, 40, 128], [40, 200, 40, 128], [40, 40, 200, 128]], np.uint8)
 ARRAYS = {"counts": np.array([[3, 0]]), "rgba": RGBA, "depth": [1.0, 2.0, 3.0]}
@@ -104,3 +109,38 @@ def test_mistakes_are_problems(tmp_path: Path) -> None:
         diaphane.advise(tmp_path / "nowhere.usda")
     with pytest.raises(Problem, match="nowhere"):
         diaphane.build([tmp_path / "nowhere.usda"], "glass")
+
+
+def test_a_build_is_asked_for_as_by_the_command_and_shows_what_it_proves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("bottles.usda", "foliage.usda"):
+        (tmp_path / name).write_text("#usda 1.0\n")
+    scenes = [tmp_path / "bottles.usda", tmp_path / "foliage.usda"]
+    asked: list[BuildOptions] = []
+
+    def build(options: BuildOptions, progress: object) -> BuildResult:
+        asked.append(options)
+        published = RegistryResult(reference="glass@1.0.0", folder="f", champion=True, reason="It is the first.")
+        return BuildResult(
+            report=Path("report.html"),
+            dataset=Path("datasets"),
+            registry=published,
+            licences="All allow it.",
+            held_out=("bottles",),
+            measurements=tuple(example()),
+            skipped={},
+            worked=True,
+            seconds=1.0,
+        )
+
+    monkeypatch.setattr(building, "run", build)
+    built = diaphane.build(scenes, "glass", holdout=scenes[:1], budgets=(1.0, 2.0), state=tmp_path, silent=True)
+    assert asked[0].options.budgets == (1.0, 2.0)
+    assert asked[0].training == (scenes[1],)
+    assert built.registry.reference == "glass@1.0.0"
+    shown = built._repr_html_()
+    assert "bundle (kbuffer-deep)" in shown
+    assert escape(built.verdict) in shown
+    with pytest.raises(Problem, match="steps"):
+        diaphane.build(scenes, "glass", steps=-1)
