@@ -61,7 +61,7 @@
       container: place,
       hover: true,
       expr: vega.expressionInterpreter,
-      tooltip: (_, event, __, value) => tell(value, event.target.getBoundingClientRect()),
+      tooltip: (_, event, __, value) => tell(value, event?.target.getBoundingClientRect()), // no event: the view ends
     });
     views.set(box, view);
     await view.runAsync();
