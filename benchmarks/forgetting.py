@@ -25,9 +25,8 @@ from benchmarks.markdown import table
 from benchmarks.outputs import add_outputs, write_figures, write_page
 from renderer.samples import SAMPLES
 from services.cli.inputs import bring
-from services.cli.remote import Remote
-from services.cli.transport import Transport
 from services.cli.watching import ensure_success
+from services.client import Client
 from services.service import open_service
 from services.settings import Settings
 from services.summary import geometric_mean
@@ -45,12 +44,12 @@ JSON = dict[str, Any]
 
 
 class Server(Protocol):
-    """What is needed of `services.cli.remote.Remote`."""
+    """What is needed of `services.client.jobs.Jobs`."""
 
     def submit(self, spec: Mapping[str, Any]) -> tuple[JSON, bool]:
         """Submits a job."""
 
-    def job(self, job_id: str) -> JSON:
+    def get(self, job_id: str) -> JSON:
         """A job."""
 
 
@@ -90,9 +89,9 @@ def _served(folder: Path, steps: int) -> list[JSON]:
     files = {name: SAMPLES[name](folder) for name in (*OLD, NEW)}
     with Service(settings.state, ROLES) as service:
         service.wait_ready(READY_SECONDS)
-        remote = Remote(Transport(f"http://{HOST}:{service.port}", key))
-        brought = bring(remote, [str(file) for file in files.values()], silent=True)
-        return measure(remote, {scene["name"]: scene["id"] for scene in brought}, steps)
+        client = Client(f"http://{HOST}:{service.port}", key)
+        brought = bring(client, [str(file) for file in files.values()], silent=True)
+        return measure(client.jobs, {scene["name"]: scene["id"] for scene in brought}, steps)
 
 
 def measure(server: Server, scenes: Mapping[str, str], steps: int) -> list[JSON]:
@@ -142,7 +141,7 @@ def _ended(server: Server, spec: Mapping[str, Any]) -> JSON:
     job, _ = server.submit(spec)
     while job["state"] in ("queued", "running"):
         time.sleep(_POLL_SECONDS)
-        job = server.job(job["id"])
+        job = server.get(job["id"])
     ensure_success(job)
     seconds = round(time.perf_counter() - begun, 1)
     print(f"{datetime.now(UTC):%H:%M:%S} {spec['kind']} {spec.get('name') or spec['model']}: {seconds} s", flush=True)

@@ -24,6 +24,7 @@ PAGES = (
 LINKED = (
     "LICENSE",
     "docs/*.json",
+    "docs/*.ipynb",
     "docs/*.png",
     "benchmarks/**/*.svg",
     "benchmarks/**/*.png",
@@ -32,6 +33,7 @@ LINKED = (
 )
 
 PACKAGES = {
+    "diaphane": ROOT,
     "labeller": ROOT,
     "renderer": ROOT,
     "trainer": ROOT,

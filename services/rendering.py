@@ -49,10 +49,10 @@ SHEET = "sheet"
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A picture that was written, and what it cost; numbers are None where there is no picture.
+    """A picture, and what it cost; numbers are None where there is none.
 
     Attributes:
-        file: Path.
+        file: Where it was written; None: it was only handed over (`take`).
         scene: File of the scene.
         view: Name of the view.
         view_how: Why it is this one.
@@ -81,7 +81,7 @@ class Picture:
         sheet: Contact sheet that it is on, written behind the last picture of its view; None: on none.
     """
 
-    file: Path
+    file: Path | None
     scene: Path
     view: str
     view_how: str
@@ -117,7 +117,7 @@ class Picture:
     def json(self) -> dict[str, Any]:
         """Of plain values only."""
         paths = {
-            "file": str(self.file),
+            "file": None if self.file is None else str(self.file),
             "scene": str(self.scene),
             "sheet": None if self.sheet is None else str(self.sheet),
         }
@@ -165,6 +165,10 @@ class _Job:
         """What is rendered."""
         return Subject(self.scene.gpu(), self.chosen.view, self.size, options.background, options.samples, options.aovs)
 
+    def budget(self, options: RenderOptions) -> Budget:
+        """Of each sample's frame."""
+        return Budget(int(options.budget * self.size[0] * self.size[1]), self.tail.name, self.tail.g)
+
 
 def render(options: RenderOptions, progress: Progress) -> Iterator[Picture]:
     """Every scene, frame, view and technique, one after the other; each picture is on disk when it is given.
@@ -172,17 +176,42 @@ def render(options: RenderOptions, progress: Progress) -> Iterator[Picture]:
     Raises:
         Problem: A scene cannot be loaded, or the only technique asked for cannot render it.
     """
-    with bundle_folder(options.bundle, options.state) as bundle:
-        needs = replace(options.needs, bundle=bundle, allocate=optimal)
-        ways = [_way(name, needs, options.samples) for name in options.techniques]
-        trained = next((way.warm.manifest.tail for way in ways if isinstance(way.warm, KBufferDeep)), None)
-        check_trained_tail(options.tail, trained)
-        tail = chosen_tail(options.tail, options.g, trained)
+    with _ways(options) as (ways, tail):
         written: set[Path] = set()
         for file in options.scenes:
             with as_usd(file) as usd:
                 scene = LocalScene(file, usd, options.load)
                 yield from _scene(scene, ways, tail, options, progress, written)
+
+
+def take(scene: LocalScene, options: RenderOptions, warm: set[str]) -> tuple[Picture, Shot]:
+    """One picture of a scene that is open, handed over instead of written.
+
+    Args:
+        scene: The scene; it is loaded at the time of the picture.
+        options: What is rendered: one technique, one camera, at most one frame.
+        warm: Techniques that drew this scene before; this one is added.
+
+    Raises:
+        Problem: The scene cannot be loaded, or the technique cannot render it.
+    """
+    with _ways(options) as ((way,), tail):
+        time = next(iter(options.frames), None)
+        scene.at(time)
+        (chosen,) = scene.views(options.camera, None)
+        job = _job(scene, chosen, _frame(scene, time), tail, options)
+        shot = _shot(job, way, options, warm)
+        return _found(_about(job, way, None, options), shot, job, options), shot
+
+
+@contextmanager
+def _ways(options: RenderOptions) -> Iterator[tuple[list[_Way], ChosenTail]]:
+    with bundle_folder(options.bundle, options.state) as bundle:
+        needs = replace(options.needs, bundle=bundle, allocate=optimal)
+        ways = [_way(name, needs, options.samples) for name in options.techniques]
+        trained = next((way.warm.manifest.tail for way in ways if isinstance(way.warm, KBufferDeep)), None)
+        check_trained_tail(options.tail, trained)
+        yield ways, chosen_tail(options.tail, options.g, trained)
 
 
 def _way(name: str, needs: Needs, samples: int) -> _Way:
@@ -217,13 +246,19 @@ def _scene(
         for line in said_warnings(scene.file, news, scene.file):
             progress.note(line)
         told.update(news)
-        frame = scene.start if time is None else None if math.isnan(time) else time
         for chosen in scene.views(options.camera, options.views):
-            size = size_of(options, chosen.aspect)
-            sheet = ContactSheet(f"{scene.file.name}, view {chosen.view.name}")
-            job = _Job(scene, chosen, frame, size, tail, [], sheet)
-            check_budget(options.budget, "--budget 2", job.size)
-            yield from _view(job, ways, options, warm, written)
+            yield from _view(_job(scene, chosen, _frame(scene, time), tail, options), ways, options, warm, written)
+
+
+def _frame(scene: LocalScene, time: float | None) -> float | None:
+    """Time code of a picture; None: the default time."""
+    return scene.start if time is None else None if math.isnan(time) else time
+
+
+def _job(scene: LocalScene, chosen: Chosen, frame: float | None, tail: ChosenTail, options: RenderOptions) -> _Job:
+    size = size_of(options, chosen.aspect)
+    check_budget(options.budget, "--budget 2", size)
+    return _Job(scene, chosen, frame, size, tail, [], ContactSheet(f"{scene.file.name}, view {chosen.view.name}"))
 
 
 def said_opaque(options: RenderOptions) -> str:
@@ -248,9 +283,22 @@ def _view(job: _Job, ways: list[_Way], options: RenderOptions, warm: set[str], w
 
 
 def _picture(job: _Job, way: _Way, path: Path, options: RenderOptions, warm: set[str]) -> Picture:
+    about = _about(job, way, path, options)
+    try:
+        shot = _shot(job, way, options, warm)
+    except Problem as problem:
+        if problem.code != ExitCode.LIMIT or len(options.techniques) == 1:
+            raise
+        return _unrendered(about, job, options, problem)
+    found = _found(about, shot, job, options)
+    _write(path, found, shot, job, options)
+    return found
+
+
+def _about(job: _Job, way: _Way, path: Path | None, options: RenderOptions) -> Picture:
+    """What is known of a picture before it is rendered."""
     width, height = job.size
-    budget = Budget(int(options.budget * width * height), job.tail.name, job.tail.g)
-    about = Picture(
+    return Picture(
         file=path,
         scene=job.scene.file,
         view=job.chosen.view.name,
@@ -261,26 +309,25 @@ def _picture(job: _Job, way: _Way, path: Path, options: RenderOptions, warm: set
         width=width,
         height=height,
         samples=options.samples,
-        budget=options.samples * budget.fragments,
+        budget=options.samples * job.budget(options).fragments,
         tail=job.tail.name,
         warnings=job.scene.gpu().scene.warnings,
     )
-    subject = job.subject(options)
-    try:
-        if way.name not in warm:
-            # Drivers compile, allocate and place memory at its first use: what is timed is not the first frame.
-            warm.add(way.name)
-            shoot(replace(subject, samples=1, aovs=()), (way.warm,), budget)
-        shot = shoot(subject, way.samples, budget)
-    except Problem as problem:
-        if problem.code != ExitCode.LIMIT or len(options.techniques) == 1:
-            raise
-        return _unrendered(about, job, options, problem)
+
+
+def _shot(job: _Job, way: _Way, options: RenderOptions, warm: set[str]) -> Shot:
+    subject, budget = job.subject(options), job.budget(options)
+    if way.name not in warm:
+        # Drivers compile, allocate and place memory at its first use: what is timed is not the first frame.
+        warm.add(way.name)
+        shoot(replace(subject, samples=1, aovs=()), (way.warm,), budget)
+    return shoot(subject, way.samples, budget)
+
+
+def _found(about: Picture, shot: Shot, job: _Job, options: RenderOptions) -> Picture:
+    """What is known of a picture once it is rendered."""
     found = _measured(about, shot)
-    if options.compare:
-        found = _compared(found, shot, job, options)
-    _write(found, shot, job, options)
-    return found
+    return _compared(found, shot, job, options) if options.compare else found
 
 
 def _unrendered(about: Picture, job: _Job, options: RenderOptions, problem: Problem) -> Picture:
@@ -330,9 +377,9 @@ def _compared(found: Picture, shot: Shot, job: _Job, options: RenderOptions) -> 
     return replace(found, mse=error, psnr=psnr, flip=metrics.flip(test, reference)[0])
 
 
-def _write(found: Picture, shot: Shot, job: _Job, options: RenderOptions) -> None:
-    if found.file.suffix.lower() == ".png":
-        with replacing(found.file) as path:
+def _write(file: Path, found: Picture, shot: Shot, job: _Job, options: RenderOptions) -> None:
+    if file.suffix.lower() == ".png":
+        with replacing(file) as path:
             write_png(path, display8(shot.linear))
         return
     passes = found.passes or {}
@@ -349,7 +396,7 @@ def _write(found: Picture, shot: Shot, job: _Job, options: RenderOptions) -> Non
         attributes |= {"budget": str(found.budget), "tail": job.tail.name, "g": job.tail.g}
     scene = job.scene.gpu().scene
     attributes |= camera_attributes(job.chosen.view, scene, found.width, found.height)
-    with replacing(found.file) as path:
+    with replacing(file) as path:
         planes = {CHANNELS[name]: plane for name, plane in shot.aovs.items()}
         write_exr(path, shot.linear, attributes, options.is_full, planes)
 

@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
 from pydantic import BaseModel, ConfigDict
 
 from schemas.measurement import Measurement, RegistryResult
+from services import summary
+from services.looks import title
+
+HEADINGS: Final = ("F / (W H)", "technique", "MSE x1e-5", "/ VKB", "PSNR dB", "FLIP", "ms")
+"""Of `BuildResult.table`; the first two are of columns of text."""
+UNPROVEN: Final = (
+    "No view of a scene that was held out was scored, so nothing is proven: give a second transparent scene."
+)
 
 
 class BuildResult(BaseModel):
@@ -35,3 +44,22 @@ class BuildResult(BaseModel):
     skipped: dict[str, int]
     worked: bool
     seconds: float
+
+    @property
+    def scored(self) -> list[Measurement]:
+        """Measurements of the scenes that were held out."""
+        return [one for one in self.measurements if one.scene in self.held_out]
+
+    @property
+    def verdict(self) -> str:
+        """What the scenes that were held out prove, in a sentence."""
+        return summary.sentence(self.scored) if self.scored else UNPROVEN
+
+    def table(self) -> list[list[str]]:
+        """Each budget and technique on the scenes that were held out."""
+        rows = []
+        for row in summary.rows(self.scored):
+            scaled = None if row.mse is None else row.mse * 1e5
+            values = (scaled, row.over_baseline, row.psnr, row.flip, row.ms)
+            rows.append([summary.number(row.budget_factor), title(row.technique), *map(summary.number, values)])
+        return rows

@@ -80,27 +80,17 @@ def build(
 def _show(options: BuildOptions, result: BuildResult) -> None:
     from rich.table import Table
 
-    from services import summary
-    from services.looks import title
+    from services.result import HEADINGS
 
     console = output.out()
-    held_out = [m for m in result.measurements if m.scene in result.held_out]
-    if held_out:
+    if rows := result.table():
         table = Table(title=f"Held out: {', '.join(result.held_out)}", title_justify="left")
-        for heading in ("F / (W H)", "technique"):
-            table.add_column(heading, no_wrap=True)
-        for heading in ("MSE x1e-5", "/ VKB", "PSNR dB", "FLIP", "ms"):
-            table.add_column(heading, justify="right")
-        for row in summary.rows(held_out):
-            scaled = None if row.mse is None else row.mse * 1e5
-            values = (scaled, row.over_baseline, row.psnr, row.flip, row.ms)
-            cells = [summary.number(value) for value in values]
-            table.add_row(summary.number(row.budget_factor), title(row.technique), *cells)
+        for i, heading in enumerate(HEADINGS):
+            table.add_column(heading, justify="left" if i < 2 else "right", no_wrap=i < 2)
+        for row in rows:
+            table.add_row(*row)
         console.print(table)
-        console.print(summary.sentence(held_out), markup=False)
-    else:
-        why = "No view of a scene that was held out was scored, so nothing is proven: give a second transparent scene."
-        console.print(why, markup=False)
+    console.print(result.verdict, markup=False)
     if result.skipped:
         skipped = ", ".join(counted(count, what) for what, count in result.skipped.items())
         console.print(f"Skipped: {skipped}.", markup=False)

@@ -22,7 +22,7 @@ def list_(
     as_json: JsonOption = False,
 ) -> None:
     """Data sets, newest first."""
-    found = list(connect(url, key_file).datasets(limit))
+    found = list(connect(url, key_file).datasets.list(limit))
     if as_json:
         output.print_json({"datasets": found})
         return
@@ -47,7 +47,7 @@ def show(
     as_json: JsonOption = False,
 ) -> None:
     """A data set: what it was made with, and its shards."""
-    found = connect(url, key_file).dataset(dataset_id)
+    found = connect(url, key_file).datasets.get(dataset_id)
     if as_json:
         output.print_json(found)
         return

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from schemas.problem import ExitCode, Problem
 from services.cli.lines import plain
-from services.cli.packing import Package, pack
+from services.client.packing import Package, pack
 from services.progress import Progress, make_progress
 
 if TYPE_CHECKING:
-    from services.cli.remote import Remote
+    from services.client import Client, Record
 
 _ID = re.compile(r"scn_[0-9a-f]{32}")
 _FIRST_TOLD_SECONDS = 5.0
@@ -75,11 +75,11 @@ def with_licences(inputs: Sequence[SceneInput], licences: Sequence[str]) -> list
     return [replace(given, licence=found.get(given.reference)) for given in inputs]
 
 
-def bring(remote: Remote, references: Sequence[str], *, silent: bool = False) -> list[dict[str, Any]]:
+def bring(server: Client, references: Sequence[str], *, silent: bool = False) -> list[Record]:
     """Uploads what is new of local scenes, and waits until the server has checked everything.
 
     Args:
-        remote: The server.
+        server: The server.
         references: Ids, or paths of files.
         silent: Whether no progress is shown.
 
@@ -92,10 +92,10 @@ def bring(remote: Remote, references: Sequence[str], *, silent: bool = False) ->
     # Everything that can be wrong here is found before anything is sent.
     packages = {r: pack(Path(r)) for r in references if not _ID.fullmatch(r)}
     progress = make_progress(sys.stderr, silent=silent)
-    sent = upload(remote, list(packages.values()), progress)
+    sent = upload(server, list(packages.values()), progress)
     ids = dict(zip(packages, (scene["id"] for scene in sent), strict=True))
-    checked = await_checks(remote, [ids.get(reference, reference) for reference in references], progress)
-    scenes: list[dict[str, Any]] = []
+    checked = await_checks(server, [ids.get(reference, reference) for reference in references], progress)
+    scenes: list[Record] = []
     for reference, scene in zip(references, checked, strict=True):
         ensure_accepted(scene, reference)
         twin = next((i for i, other in enumerate(scenes) if other["id"] == scene["id"]), None)
@@ -105,7 +105,7 @@ def bring(remote: Remote, references: Sequence[str], *, silent: bool = False) ->
     return scenes
 
 
-def upload(remote: Remote, packages: Sequence[Package], progress: Progress) -> list[dict[str, Any]]:
+def upload(server: Client, packages: Sequence[Package], progress: Progress) -> list[Record]:
     """Uploads and registers scenes; says what they refer to and lack.
 
     Returns:
@@ -125,18 +125,18 @@ def upload(remote: Remote, packages: Sequence[Package], progress: Progress) -> l
                 sent += count
                 stage.advance(0, f"{name} {sent / 2**20:.1f} MiB")
 
-            scenes.append(remote.upload_scene(package, advance))
+            scenes.append(server.scenes.upload(package, advance))
             if not sent:
                 progress.skipped("scenes that the server had already")
             stage.advance(1, package.name)
     return scenes
 
 
-def await_checks(remote: Remote, scene_ids: Sequence[str], progress: Progress) -> list[dict[str, Any]]:
+def await_checks(server: Client, scene_ids: Sequence[str], progress: Progress) -> list[Record]:
     """Waits until the server has checked scenes, and says that it still does.
 
     Args:
-        remote: The server.
+        server: The server.
         scene_ids: Their ids.
         progress: What it is said to.
 
@@ -161,7 +161,7 @@ def await_checks(remote: Remote, scene_ids: Sequence[str], progress: Progress) -
                         f"{name} is still being checked ({waited:.0f} s); `diaphane workers` shows the queue."
                     )
 
-            scenes.append(remote.wait_for_scene(scene_id, waiting=say))
+            scenes.append(server.scenes.wait(scene_id, waiting=say))
             stage.advance(1)
     return scenes
 

@@ -33,7 +33,7 @@ def list_(
     as_json: JsonOption = False,
 ) -> None:
     """Jobs, newest first."""
-    jobs = list(connect(url, key_file).jobs(limit, state=state, kind=kind, name=name))
+    jobs = list(connect(url, key_file).jobs.list(limit, state=state, kind=kind, name=name))
     if as_json:
         output.print_json({"jobs": jobs})
         return
@@ -60,7 +60,7 @@ def show(
     job_id: JobArgument, url: UrlOption = DEFAULT_URL, key_file: KeyFileOption = None, as_json: JsonOption = False
 ) -> None:
     """A job: how far it is, what it made, why it failed."""
-    show_job(connect(url, key_file).job(job_id), as_json=as_json)
+    show_job(connect(url, key_file).jobs.get(job_id), as_json=as_json)
 
 
 @app.command()
@@ -80,7 +80,7 @@ def cancel(
     job_id: JobArgument, url: UrlOption = DEFAULT_URL, key_file: KeyFileOption = None, as_json: JsonOption = False
 ) -> None:
     """Stop a job; what it made until now is kept."""
-    _say(connect(url, key_file).cancel(job_id), as_json=as_json)
+    _say(connect(url, key_file).jobs.cancel(job_id), as_json=as_json)
 
 
 @app.command()
@@ -88,7 +88,7 @@ def retry(
     job_id: JobArgument, url: UrlOption = DEFAULT_URL, key_file: KeyFileOption = None, as_json: JsonOption = False
 ) -> None:
     """Let a failed or cancelled job go on; what is made already is not made again."""
-    _say(connect(url, key_file).retry(job_id), as_json=as_json)
+    _say(connect(url, key_file).jobs.retry(job_id), as_json=as_json)
 
 
 @app.command()
@@ -102,7 +102,7 @@ def tasks(
     as_json: JsonOption = False,
 ) -> None:
     """The tasks of a job; a quarantined one with the reason."""
-    found = list(connect(url, key_file).tasks(job_id, limit, stage=stage, state=state))
+    found = list(connect(url, key_file).jobs.tasks(job_id, limit, stage=stage, state=state))
     if as_json:
         output.print_json({"tasks": found})
         return
@@ -126,8 +126,8 @@ def events(
     """What happened in a job; with --json one object a line."""
     import json
 
-    remote = connect(url, key_file)
-    for event in remote.events(job_id, after) if is_followed else remote.past_events(job_id, after):
+    jobs = connect(url, key_file).jobs
+    for event in jobs.events(job_id, after) if is_followed else jobs.past_events(job_id, after):
         if as_json:
             print(json.dumps(event), flush=True)
             continue

@@ -74,7 +74,7 @@ def create(
         made: dict[str, Any] = {"key": record.model_dump(mode="json"), "secret": secret}
     else:
         moment = None if expires is None else datetime.fromtimestamp(expires, UTC).isoformat(timespec="seconds")
-        made = connect(url, key_file).create_key(name, scope, moment, bounds)
+        made = connect(url, key_file).keys.create(name, scope, moment, bounds)
     if as_json:
         output.print_json(made)
         return
@@ -95,7 +95,7 @@ def list_(
         with _local(state) as keys:
             found = [key.model_dump(mode="json") for key in keys.list()]
     else:
-        found = list(connect(url, key_file).keys())
+        found = list(connect(url, key_file).keys.list())
     if as_json:
         output.print_json({"keys": found})
         return
@@ -116,7 +116,7 @@ def revoke(
         with _local(state) as keys:
             keys.revoke(key_id)
     else:
-        connect(url, key_file).revoke_key(key_id)
+        connect(url, key_file).keys.revoke(key_id)
     print(f"{key_id} is revoked.")
 
 

@@ -17,7 +17,7 @@ from services.cli.server import URL_VARIABLE, KeyFileOption, connect
 from services.cli.state import DEFAULT_STATE, JsonOption, StateOption
 
 if TYPE_CHECKING:
-    from services.cli.remote import Remote
+    from services.client import Client
     from services.registry import Publication, Registry
 
 app = typer.Typer(help="Published bundles: list, show, promote, roll back.", no_args_is_help=True)
@@ -207,33 +207,33 @@ class _Server:
     """The registry of a server.
 
     Args:
-        remote: The server.
+        server: The server.
     """
 
-    def __init__(self, remote: Remote) -> None:
-        self._remote = remote
+    def __init__(self, server: Client) -> None:
+        self._server = server
 
     def close(self) -> None:
-        self._remote.transport.close()
+        self._server.close()
 
     def models(self) -> list[dict[str, Any]]:
-        return list(self._remote.models())
+        return list(self._server.models.list())
 
     def versions(self, name: str) -> list[dict[str, Any]]:
-        return sorted(self._remote.versions(name), key=lambda version: _order(version["version"]))
+        return sorted(self._server.models.versions(name), key=lambda version: _order(version["version"]))
 
     def version(self, name: str, selector: str) -> dict[str, Any]:
-        return self._remote.version(name, selector)
+        return self._server.models.get(name, selector)
 
     def aliases(self, name: str) -> dict[str, Any]:
-        found = self._remote.aliases(name)
+        found = self._server.models.aliases(name)
         return {**found, "history": sorted(found["history"], key=lambda move: str(move["at"]))}
 
     def move_alias(self, name: str, alias: str, version: str, reason: str) -> None:
-        self._remote.move_alias(name, alias, version, reason)
+        self._server.models.move_alias(name, alias, version, reason)
 
     def roll_back(self, name: str, alias: str, reason: str) -> None:
-        self._remote.roll_back(name, alias, reason)
+        self._server.models.roll_back(name, alias, reason)
 
 
 def _order(version: str) -> tuple[int, ...]:

@@ -21,7 +21,7 @@ from services.cli.submit import ViewsOption, job_fields, job_spec
 
 if TYPE_CHECKING:
     from services.cli.comparison import Comparison
-    from services.cli.remote import Remote
+    from services.client import Client
 
 CHAMPION, SCRATCH = "champion", "scratch"
 OWN = ("name", "dataset", "model", "start_from", "promote")
@@ -60,15 +60,15 @@ def retrain(
     """
     _check(max_regression, baseline)
     fields = job_fields(given)
-    remote = connect(url, key_file)
-    champion = _champion(remote, name)
-    fields |= {"kind": "build", "name": name, "promote": "never", "start_from": _start(remote, start, champion)}
-    spec = _with_scenes(remote, fields, (scenes, holdout, licence or []), views, silent=as_json)
-    job, rival = _finished(remote, spec, champion, silent=as_json)
-    comparison = _compare(remote, job, spec, rival if baseline == CHAMPION else None)
+    server = connect(url, key_file)
+    champion = _champion(server, name)
+    fields |= {"kind": "build", "name": name, "promote": "never", "start_from": _start(server, start, champion)}
+    spec = _with_scenes(server, fields, (scenes, holdout, licence or []), views, silent=as_json)
+    job, rival = _finished(server, spec, champion, silent=as_json)
+    comparison = _compare(server, job, spec, rival if baseline == CHAMPION else None)
     faults = comparison.faults(max_regression)
     if is_promoted and not faults and comparison.is_better:
-        _promote(remote, name, comparison)
+        _promote(server, name, comparison)
     _publish(comparison.markdown(max_regression), summary)
     _hand_on({"reference": comparison.reference, "job": job["id"], "passed": str(not faults).lower()})
     if as_json:
@@ -90,23 +90,23 @@ def _check(max_regression: float, baseline: str) -> None:
         raise Problem(f"--baseline '{baseline}' is not known.", f"Choose {CHAMPION} or none.")
 
 
-def _start(remote: Remote, start: str, champion: dict[str, Any] | None) -> str:
+def _start(server: Client, start: str, champion: dict[str, Any] | None) -> str:
     """What the job is told to begin with: a version in the place of an alias, so that a repeated run means the same."""
     if start == CHAMPION:
         return SCRATCH if champion is None else CHAMPION
     if start == SCRATCH:
         return SCRATCH
     name, _, selector = start.partition("@")
-    version = remote.version(name, selector or CHAMPION)["version"]
+    version = server.models.get(name, selector or CHAMPION)["version"]
     return f"{name}@{version}"
 
 
-def _champion(remote: Remote, name: str) -> dict[str, Any] | None:
+def _champion(server: Client, name: str) -> dict[str, Any] | None:
     """The champion of a name, if there is one yet."""
-    from services.cli.transport import RefusedRequest
+    from services.client.transport import RefusedRequest
 
     try:
-        return remote.version(name, CHAMPION)
+        return server.models.get(name, CHAMPION)
     except RefusedRequest as refused:
         if refused.code is ExitCode.NOT_FOUND:
             return None
@@ -114,7 +114,7 @@ def _champion(remote: Remote, name: str) -> dict[str, Any] | None:
 
 
 def _with_scenes(
-    remote: Remote,
+    server: Client,
     fields: Mapping[str, Any],
     named: tuple[list[str], list[str], list[str]],
     views: Path | None,
@@ -128,12 +128,12 @@ def _with_scenes(
     inputs = with_licences(named_scenes(scenes, holdout), licences)
     stand_ins = [{"scene": f"scn_{i:032x}", "holdout": given.held_out} for i, given in enumerate(inputs)]
     job_spec({**fields, "scenes": stand_ins})  # whatever is wrong is said before anything is uploaded
-    known = bring(remote, [given.reference for given in inputs], silent=silent)
+    known = bring(server, [given.reference for given in inputs], silent=silent)
     return job_spec({**fields, "scenes": scene_uses(inputs, known, views)})
 
 
 def _finished(
-    remote: Remote, spec: dict[str, Any], champion: dict[str, Any] | None, *, silent: bool
+    server: Client, spec: dict[str, Any], champion: dict[str, Any] | None, *, silent: bool
 ) -> tuple[dict[str, Any], str | None]:
     """The job of these scenes, finished, and the version that it was compared with.
 
@@ -142,28 +142,28 @@ def _finished(
     from services.cli.watching import ensure_success, follow
 
     before = None if champion is None else str(champion["version"])
-    job = _job_of(remote, champion, spec)
+    job = _job_of(server, champion, spec)
     if job is not None:
-        before = _before(remote, spec["name"], str(before))
+        before = _before(server, spec["name"], str(before))
     else:
-        job, is_new = remote.submit(spec, _idempotency_key(spec, before))
+        job, is_new = server.jobs.submit(spec, _idempotency_key(spec, before))
         if not is_new and job["state"] in ("failed", "cancelled"):
-            job = remote.retry(job["id"])
+            job = server.jobs.retry(job["id"])
     if not silent:
         output.err().print(f"Job {job['id']}: {job['state']}", markup=False)
-    job = follow(remote, job["id"], silent=silent)
+    job = follow(server, job["id"], silent=silent)
     ensure_success(job)
     return job, before
 
 
-def _job_of(remote: Remote, version: dict[str, Any] | None, spec: Mapping[str, Any]) -> dict[str, Any] | None:
+def _job_of(server: Client, version: dict[str, Any] | None, spec: Mapping[str, Any]) -> dict[str, Any] | None:
     """The job that published a version, if it was the very same job."""
-    from services.cli.transport import RefusedRequest
+    from services.client.transport import RefusedRequest
 
     if version is None or not version.get("job_id"):
         return None
     try:
-        job = remote.job(version["job_id"])
+        job = server.jobs.get(version["job_id"])
     except RefusedRequest as refused:
         if refused.code is ExitCode.NOT_FOUND:  # jobs are removed by age
             return None
@@ -178,9 +178,9 @@ def _began_alike(name: str, start: str, its: str) -> bool:
     return start == its or (start == CHAMPION and (its == SCRATCH or its.startswith(f"{name}@")))
 
 
-def _before(remote: Remote, name: str, version: str) -> str | None:
+def _before(server: Client, name: str, version: str) -> str | None:
     """The champion before a version became it."""
-    moves = [m for m in remote.aliases(name)["history"] if m["alias"] == CHAMPION and m["after"] == version]
+    moves = [m for m in server.models.aliases(name)["history"] if m["alias"] == CHAMPION and m["after"] == version]
     return max(moves, key=lambda move: str(move["at"]))["before"] if moves else None
 
 
@@ -190,14 +190,14 @@ def _idempotency_key(spec: Mapping[str, Any], champion: str | None) -> str:
     return f"retrain-{hashlib.sha256(text.encode()).hexdigest()}"
 
 
-def _compare(remote: Remote, job: dict[str, Any], spec: Mapping[str, Any], champion: str | None) -> Comparison:
+def _compare(server: Client, job: dict[str, Any], spec: Mapping[str, Any], champion: str | None) -> Comparison:
     from services.cli.comparison import code, comparison_of
 
     notes = []
     if job.get("skipped"):
         counts = ", ".join(f"{count:,} {what}" for what, count in job["skipped"].items())
         notes.append(f"Skipped, because it was there already: {code(counts)}.")
-    for task in remote.tasks(job["id"], _SHOWN_TASKS, state="quarantined"):
+    for task in server.jobs.tasks(job["id"], _SHOWN_TASKS, state="quarantined"):
         problem = task.get("problem") or {}
         what = f"{task['stage']} of {task['name']}: {problem.get('detail', 'it failed')}"
         notes.append(f"Left out: {code(what)}.")
@@ -206,9 +206,9 @@ def _compare(remote: Remote, job: dict[str, Any], spec: Mapping[str, Any], champ
     return comparison_of(job, champion, expected, tuple(notes))
 
 
-def _promote(remote: Remote, name: str, comparison: Comparison) -> None:
+def _promote(server: Client, name: str, comparison: Comparison) -> None:
     version = comparison.reference.partition("@")[2]
-    parity = remote.version(name, version).get("parity") or {}
+    parity = server.models.get(name, version).get("parity") or {}
     if max(parity["torch_onnx"], parity["torch_glsl"]) > parity["tolerance"]:
         raise Problem(
             f"{comparison.reference} is better, but its exported forms do not agree.",
@@ -217,7 +217,7 @@ def _promote(remote: Remote, name: str, comparison: Comparison) -> None:
         )
     change = comparison.total.change
     why = "first version" if change is None else f"error {100.0 * change:+.1f} % on the committed scenes"
-    remote.move_alias(name, CHAMPION, version, f"diaphane retrain: {why}")
+    server.models.move_alias(name, CHAMPION, version, f"diaphane retrain: {why}")
 
 
 def _publish(table: str, summary: Path | None) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -31,17 +32,17 @@ def upload(
     """Upload scenes with all files that they use; only what the server lacks is sent."""
     from schemas.problem import Problem
     from services.cli import inputs
-    from services.cli.packing import pack
+    from services.client.packing import pack
     from services.progress import make_progress
 
     if name is not None and len(files) > 1:
         raise Problem("--name names one scene, and several were given.", "Upload them one by one, or leave --name out.")
     packages = [pack(path, name) for path in files]
-    remote = connect(url, key_file)
+    server = connect(url, key_file)
     progress = make_progress(sys.stderr, silent=as_json)
-    scenes = inputs.upload(remote, packages, progress)
+    scenes = inputs.upload(server, packages, progress)
     if wait:
-        scenes = inputs.await_checks(remote, [scene["id"] for scene in scenes], progress)
+        scenes = inputs.await_checks(server, [scene["id"] for scene in scenes], progress)
     _show_all(scenes, as_json=as_json)
     for path, scene in zip(files, scenes, strict=True):
         inputs.ensure_accepted(scene, str(path))
@@ -55,7 +56,7 @@ def list_(
     as_json: JsonOption = False,
 ) -> None:
     """Scenes that were uploaded, newest first."""
-    _show_all(list(connect(url, key_file).scenes(limit)), as_json=as_json)
+    _show_all(list(connect(url, key_file).scenes.list(limit)), as_json=as_json)
 
 
 @app.command()
@@ -66,7 +67,7 @@ def show(
     as_json: JsonOption = False,
 ) -> None:
     """A scene: its files, what was found in it, or why it was rejected."""
-    scene = connect(url, key_file).scene(scene_id)
+    scene = connect(url, key_file).scenes.get(scene_id)
     if as_json:
         output.print_json(scene)
         return
@@ -79,7 +80,7 @@ def show(
     print_columns(("file", "size", "sha256"), rows)
 
 
-def _show_all(scenes: list[dict[str, Any]], *, as_json: bool) -> None:
+def _show_all(scenes: Sequence[dict[str, Any]], *, as_json: bool) -> None:
     if as_json:
         output.print_json({"scenes": scenes})
         return

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from services.cli.remote import Remote
+    from services.client import Client
 
 DEFAULT_URL = "http://127.0.0.1:8035"
 URL_VARIABLE = "DIAPHANE_URL"
@@ -27,7 +27,7 @@ KeyFileOption = Annotated[
 LimitOption = Annotated[int, typer.Option("--limit", min=1, help="Show at most this many, newest first.")]
 
 
-def connect(url: str, key_file: Path | None) -> Remote:
+def connect(url: str, key_file: Path | None) -> Client:
     """The server at a URL, with the key of the file or the environment.
 
     Args:
@@ -38,9 +38,9 @@ def connect(url: str, key_file: Path | None) -> Remote:
         Problem: The URL or the key is not understood.
     """
     # Imported late: `diaphane --help` does not need a HTTP client.
-    from services.cli.remote import open_remote
+    from services.client import Client
 
-    return open_remote(url, find_key(url, key_file))
+    return Client(url, find_key(url, key_file))
 
 
 def find_key(url: str, key_file: Path | None) -> str | None:
@@ -57,7 +57,7 @@ def find_key(url: str, key_file: Path | None) -> str | None:
         Problem: The key is not understood, or must not be sent to this server.
     """
     from services.cli import config
-    from services.cli.remote import KEY_VARIABLE, read_key
+    from services.client.keys import KEY_VARIABLE, read_key
 
     if key_file is None and not os.environ.get(KEY_VARIABLE, "").strip():
         key_file = config.current().key_file(url, DEFAULT_URL)

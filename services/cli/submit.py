@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -51,17 +51,17 @@ def submit(
     inputs = with_licences(named_scenes(scene or (), holdout or ()), licence or ())
     # Everything but the scenes' ids is checked before anything is uploaded.
     job_spec({**fields, "kind": kind, "scenes": [_stand_in(i, entry) for i, entry in enumerate(inputs)]})
-    remote = connect(url, key_file)
-    scenes = bring(remote, [entry.reference for entry in inputs], silent=as_json)
+    server = connect(url, key_file)
+    scenes = bring(server, [entry.reference for entry in inputs], silent=as_json)
     if kind == "build" and not holdout:
         inputs = _split(inputs, scenes)
     spec = job_spec({**fields, "kind": kind, "scenes": scene_uses(inputs, scenes, views)})
-    job, _ = remote.submit(spec, idempotency_key)
+    job, _ = server.jobs.submit(spec, idempotency_key)
     if not is_watched:
         _announce(job, as_json=as_json)
         return
     output.err().print(f"{job['id']}: watch it from elsewhere with: diaphane jobs watch {job['id']}", markup=False)
-    job = follow(remote, job["id"], silent=as_json)
+    job = follow(server, job["id"], silent=as_json)
     show_job(job, as_json=as_json)
     ensure_success(job)
 
@@ -98,7 +98,7 @@ def _stand_in(number: int, entry: SceneInput) -> dict[str, Any]:
     return {"scene": stand_in, "holdout": entry.held_out, "licence": entry.licence}
 
 
-def _split(inputs: list[SceneInput], scenes: list[dict[str, Any]]) -> list[SceneInput]:
+def _split(inputs: list[SceneInput], scenes: Sequence[dict[str, Any]]) -> list[SceneInput]:
     """A quarter of the scenes is held out, by their names, as `diaphane build` does."""
     from services.options import default_holdout
 

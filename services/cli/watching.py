@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Protocol, TextIO
 
 from schemas.problem import ExitCode, Problem
 from services.cli.lines import plain, seconds
-from services.cli.remote import FINAL_STATES, Remote
+from services.client import Client, Record
+from services.client.jobs import FINAL_STATES
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -31,11 +32,11 @@ class Screen(Protocol):
         """One line that the user should see."""
 
 
-def follow(remote: Remote, job_id: str, *, silent: bool = False, stream: TextIO | None = None) -> dict[str, Any]:
+def follow(server: Client, job_id: str, *, silent: bool = False, stream: TextIO | None = None) -> Record:
     """Shows a job until it ends.
 
     Args:
-        remote: The server.
+        server: The server.
         job_id: The job.
         silent: Whether nothing is shown.
         stream: Where it is shown; None: stderr.
@@ -49,14 +50,14 @@ def follow(remote: Remote, job_id: str, *, silent: bool = False, stream: TextIO 
     try:
         with _screen(stream or sys.stderr, silent=silent) as screen:
             shown = 0.0
-            for event in remote.events(job_id):
+            for event in server.jobs.events(job_id):
                 if event["kind"] == "log":
                     for line in _log_lines(event["data"]):
                         screen.note(line)
                 if time.monotonic() - shown >= REFRESH_SECONDS:
-                    screen.show(remote.job(job_id))
+                    screen.show(server.jobs.get(job_id))
                     shown = time.monotonic()
-            job = remote.job(job_id)
+            job = server.jobs.get(job_id)
             screen.show(job)
             return job
     except KeyboardInterrupt:

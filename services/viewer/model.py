@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from schemas.problem import ExitCode, Problem
+from services.client.pulling import FETCHED, refused_pull, verifying_client
 from services.rendering import bundle_folder
 
-FETCHED = "bundles"
-"""Folder of fetched bundles, in that of the state."""
 _EVERY = 5.0
 """Seconds between two questions for the alias; one about the same version costs a small answer."""
 
@@ -86,7 +84,7 @@ def remote_source(service: Service) -> Iterator[Source]:
     Raises:
         Problem: The client is not installed, or there is no such bundle, or it is not what was signed.
     """
-    client = _client()
+    client = verifying_client()
     name, _, alias = service.reference.partition("@")
     asked: dict[str, Any] = {"url": service.url, "key": service.key, "folder": service.state / FETCHED}
     asked["public_key"] = service.public_key
@@ -95,7 +93,7 @@ def remote_source(service: Service) -> Iterator[Source]:
     try:
         first = next(bundles)
     except client.PullError as error:
-        raise Problem(error.what, error.remedy, _code(client, error)) from error
+        raise refused_pull(error) from error
 
     def listen() -> None:
         for folder in bundles:
@@ -107,21 +105,3 @@ def remote_source(service: Service) -> Iterator[Source]:
         yield Source(first, fetched_name(name, first), later)
     finally:
         stop.set()
-
-
-def _client() -> Any:
-    """The package of deploy/client/python, a distribution of its own that nothing else here needs."""
-    try:
-        import diaphane_client
-    except ModuleNotFoundError as error:
-        raise Problem(
-            "A model of a service is fetched by the Python client, which is not installed.",
-            "Run `pip install ./deploy/client/python`, or name a folder with --bundle.",
-            ExitCode.CHECK_FAILED,
-        ) from error
-    return diaphane_client
-
-
-def _code(client: Any, error: Exception) -> ExitCode:
-    codes = {client.Unavailable: ExitCode.TRY_AGAIN, client.Denied: ExitCode.AUTH, client.NotFound: ExitCode.NOT_FOUND}
-    return codes.get(type(error), ExitCode.CHECK_FAILED)

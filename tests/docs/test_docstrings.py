@@ -10,7 +10,16 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("schemas", "renderer", "labeller", "trainer", "stress", "services", "deploy/client/python/diaphane_client")
+PACKAGES = (
+    "schemas",
+    "renderer",
+    "labeller",
+    "trainer",
+    "stress",
+    "services",
+    "diaphane",
+    "deploy/client/python/diaphane_client",
+)
 ARRAYS = re.compile(r"\b(?:NDArray|ndarray|ArrayLike)\b")
 
 

@@ -17,7 +17,7 @@ from services.cli import tables
 from services.cli.app import app
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("schemas", "renderer", "labeller", "trainer", "stress", "services")
+PACKAGES = ("schemas", "renderer", "labeller", "trainer", "stress", "services", "diaphane")
 FOLDERS = ("", "docs/", "benchmarks/", "deploy/", "deploy/retrain/", "deploy/client/*/")
 DOCUMENTS = sorted(path.relative_to(ROOT).as_posix() for folder in FOLDERS for path in ROOT.glob(f"{folder}*.md"))
 

@@ -20,9 +20,10 @@ import services
 from schemas.problem import ExitCode, Problem
 from services.cli import inputs
 from services.cli.app import run
-from services.cli.packing import pack
-from services.cli.remote import Remote, open_remote, server_sent
-from services.cli.transport import Transport
+from services.client import Client
+from services.client.events import server_sent
+from services.client.packing import pack
+from services.client.transport import Transport
 
 ROOT = Path(services.__file__).parent.parent
 
@@ -43,8 +44,8 @@ def server(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[FakeServer
         yield fake
 
 
-def remote(server: FakeServer) -> Remote:
-    return open_remote(server.url, KEY)
+def client(server: FakeServer) -> Client:
+    return Client(server.url, KEY)
 
 
 def usdz(folder: Path, name: str = "glass.usdz", size: int = 2500) -> Path:
@@ -110,7 +111,7 @@ def test_an_upload_that_was_broken_off_goes_on_in_another_process(server: FakeSe
     path = usdz(folder)
     server.faults.append(Fault("PATCH", "/v1/uploads/.*", status=403))
     with pytest.raises(Problem):
-        remote(server).upload_scene(pack(path))
+        client(server).scenes.upload(pack(path))
     (upload,) = server.uploads.values()
     upload["data"] = path.read_bytes()[:1500]
     assert run(["scenes", "upload", "glass.usdz"]) == ExitCode.OK
@@ -227,12 +228,12 @@ def test_what_must_not_happen_twice_is_not_repeated(server: FakeServer) -> None:
     server.move("glass", "champion", "1.1.0", "second")
     server.faults.append(Fault("POST", "/v1/models/.*/rollback"))
     with pytest.raises(Problem) as caught:
-        remote(server).roll_back("glass", "champion", "worse")
+        client(server).models.roll_back("glass", "champion", "worse")
     assert caught.value.code is ExitCode.TRY_AGAIN
     assert server.count("POST", "/v1/models/.*/rollback") == 1
     server.faults.append(Fault("POST", "/v1/models/.*/rollback", status=503))
     with pytest.raises(Problem):
-        remote(server).roll_back("glass", "champion", "worse")
+        client(server).models.roll_back("glass", "champion", "worse")
     assert server.count("POST", "/v1/models/.*/rollback") == 2
 
 
@@ -443,7 +444,7 @@ def test_a_broken_stream_goes_on_after_the_last_event(
     (job_id,) = server.jobs
     server.cut_after = [2, 0, 1]
     server.faults.append(Fault("GET", "/v1/jobs/.*/events", status=503, headers={"Retry-After": "0"}))
-    numbers = [event["number"] for event in remote(server).events(job_id)]
+    numbers = [event["number"] for event in client(server).jobs.events(job_id)]
     assert numbers == list(range(1, 8))
     capsys.readouterr()
     assert run(["jobs", "events", job_id, "--after", "5", "--json"]) == ExitCode.OK
@@ -580,3 +581,21 @@ def test_of_a_traceback_in_the_log_only_the_error_is_shown(
     shown = capsys.readouterr().err.splitlines()
     assert "render of glass front: ValueError: bad luck" in shown
     assert not [line for line in shown if "boil" in line or "Traceback" in line]
+
+
+# The same client in a program
+
+
+def test_a_program_uploads_submits_and_waits(server: FakeServer, folder: Path) -> None:
+    usdz(folder)
+    server.checks = 2
+    with client(server) as asked:
+        scene = asked.scenes.add("glass.usdz", "cup")
+        assert (scene["state"], scene["name"]) == ("accepted", "cup")
+        job, is_new = asked.jobs.submit({"kind": "render", "scenes": [{"scene": scene["id"]}]})
+        assert is_new
+        assert asked.jobs.wait(job["id"])["state"] == "succeeded"
+        assert [one["id"] for one in asked.jobs.list()] == [job["id"]]
+        assert job["id"] in asked.jobs.list()._repr_html_()
+        assert asked.scenes.list() == [scene]
+        assert KEY not in repr(asked) + asked._repr_html_()

@@ -28,7 +28,7 @@ class Server:
         self.specs.append(JobSpec.model_validate(dict(spec)))
         return {"id": f"job_{len(self.specs) - 1}", "state": "queued"}, True
 
-    def job(self, job_id: str) -> dict[str, Any]:
+    def get(self, job_id: str) -> dict[str, Any]:
         spec = self.specs[int(job_id.removeprefix("job_"))]
         if spec.name == self._failing:
             return {"id": job_id, "state": "failed", "problem": {"detail": "No view is left.", "remedy": "Add one."}}

@@ -14,6 +14,8 @@ from support.api import Api
 from diaphane_client import Denied, NotFound, Refused, Unavailable, cached, pull
 from diaphane_client import server as client_server
 from schemas.bundle import load_manifest
+from schemas.problem import ExitCode, Problem
+from services.client import Client
 from services.registry import handovers
 from services.registry.signing import KEY_FILE
 
@@ -52,6 +54,37 @@ def test_a_published_version_is_pulled_once_and_followed_by_its_alias(
     assert cached("glass", url="http://localhost", folder=tmp_path / "bundles") == first
     with pytest.raises(Denied):
         pull("glass", **{**options, "key": "dia_unknown"})
+
+
+def test_a_program_reads_the_registry_and_pulls_from_it(api: Api, tmp_path: Path) -> None:
+    api.version(tmp_path / "a", "a")
+    with Client("http://localhost", api.secrets["read"]) as asked:
+        version = asked.models.get("glass", "1.0.0")
+        assert [one["version"] for one in asked.models.versions("glass")] == [version["version"]]
+        assert "glass" in asked.models.list()._repr_html_()
+        folder = asked.models.pull("glass", "1.0.0", tmp_path / "bundles")
+        assert (load_manifest(folder).name, folder.name) == ("glass", "1.0.0")
+        with pytest.raises(Problem, match="does not have") as caught:
+            asked.models.pull("nothing", folder=tmp_path / "bundles")
+        assert caught.value.code is ExitCode.NOT_FOUND
+
+
+@pytest.mark.parametrize("url", ["ftp://x", "http://", "diaphane.example", "https://me:word@diaphane.example"])
+def test_what_is_no_url_is_refused_before_anything_is_asked(url: str, tmp_path: Path) -> None:
+    with pytest.raises(NotFound, match="server's URL"):
+        pull("glass", url=url, key=None, folder=tmp_path)
+    with pytest.raises(Problem, match="server's URL"):
+        Client(url)
+
+
+@pytest.mark.parametrize("key", ["two words", "dia_\u00e9", "a\nb"])
+def test_what_is_no_key_is_refused_before_anything_is_asked(key: str, tmp_path: Path) -> None:
+    with pytest.raises(Denied):
+        pull("glass", url="http://localhost", key=key, folder=tmp_path)
+    with pytest.raises(Problem) as caught:
+        Client("http://localhost", key)
+    assert caught.value.code is ExitCode.AUTH
+    assert key not in str(caught.value)
 
 
 def test_a_rotation_of_the_real_service_is_followed(api: Api, tmp_path: Path) -> None:

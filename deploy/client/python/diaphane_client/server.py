@@ -5,16 +5,15 @@ Downloads of files go on where they were cut.
 
 from __future__ import annotations
 
-import ssl
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 from typing import Self
 
 import httpx
 
+from diaphane_client.connection import BadKey, BadUrl, connect
 from diaphane_client.errors import Denied, NotFound, PullError, Refused, Unavailable
 from diaphane_client.files import file_sha256
 from diaphane_client.manifest import FileRef
@@ -34,18 +33,19 @@ class Server:
         url: Where it is, without `/v1`.
         key: API key with the scope `read`; None: no key.
         timeout: Seconds without a byte after which a connection is given up.
+
+    Raises:
+        NotFound: The URL is not one.
+        Denied: The key is not one.
     """
 
     def __init__(self, url: str, key: str | None, timeout: float) -> None:
-        headers = {"Accept-Encoding": "identity"}
-        if key := (key or "").strip():  # files of keys end with a line feed
-            if not (key.isascii() and key.isprintable()):
-                raise Denied("The key is not one.", "A key is one word: dia_...")
-            headers["Authorization"] = f"Bearer {key}"
-        # Redirects are not followed: the key is for this server only.
-        self._http = httpx.Client(
-            base_url=url.rstrip("/"), headers=headers, timeout=timeout, follow_redirects=False, verify=_certificates()
-        )
+        try:
+            self._http = connect(url, key, timeout, {"Accept-Encoding": "identity"})
+        except BadUrl as error:
+            raise NotFound(error.what, error.remedy) from error
+        except BadKey as error:
+            raise Denied(str(error), "A key is one word: dia_...") from error
 
     def __enter__(self) -> Self:
         return self
@@ -147,18 +147,10 @@ class Server:
                     stream.write(chunk)
 
 
-@cache
-def _certificates() -> ssl.SSLContext:
-    """The trusted authorities: read once, since that takes longer than asking whether there is a new version."""
-    return httpx.create_ssl_context()
-
-
 @contextmanager
 def _reported() -> Iterator[None]:
     try:
         yield
-    except httpx.InvalidURL as error:
-        raise NotFound(f"The URL is not understood ({error}).", "Give it like https://diaphane.example.") from error
     except httpx.HTTPError as error:
         raise Unavailable(
             f"The server cannot be reached ({type(error).__name__}).", "Check the URL and the network, and try again."

@@ -4,8 +4,8 @@ Rules:
 - a request that can be repeated is repeated while the server cannot be reached, is overloaded or restarts; one that
   cannot, only while it has certainly not arrived;
 - `Retry-After` is obeyed; otherwise waits double, with some randomness so that many clients do not come back at once;
-- a redirect is not followed and a link is only followed on the server itself, so that the key goes nowhere else;
-- the key is in one header and nowhere else: not in messages, not in logs, not in `repr`.
+- a link is only followed on the server itself, so that the key goes nowhere else;
+- the key is in one header and nowhere else (`connection`): not in messages, not in logs, not in `repr`.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
-from urllib.parse import urlsplit
 
 import httpx
 
 from schemas.problem import ExitCode, Problem
 from services.cli.lines import plain
+from services.client.connection import BadKey, BadUrl, checked_url, connect
 
 LOG = logging.getLogger(__name__)
 
@@ -112,7 +112,7 @@ class Transport:
         first_patience: The same before it has answered at all.
 
     Raises:
-        Problem: The URL is not one, or carries a password.
+        Problem: The URL is not one, or carries a password; or the key is not one.
     """
 
     def __init__(
@@ -123,15 +123,15 @@ class Transport:
         patience: float = PATIENCE_SECONDS,
         first_patience: float = FIRST_PATIENCE_SECONDS,
     ) -> None:
-        self.url = _checked(url)
         self._patience, self._first_patience = patience, first_patience
         self._answered = False
-        headers = {"User-Agent": "diaphane-cli", "Accept": "application/json"}
-        if key is not None:
-            headers["Authorization"] = f"Bearer {key}"
-        # A proxy cannot reach this machine's own loopback, so the environment's is not asked there.
-        loopback = urlsplit(self.url).hostname in ("127.0.0.1", "localhost", "::1")
-        self._client = httpx.Client(headers=headers, timeout=_TIMEOUT, trust_env=not loopback)
+        try:
+            self.url = checked_url(url)
+            self._client = connect(url, key, _TIMEOUT, {"User-Agent": "diaphane", "Accept": "application/json"})
+        except BadUrl as error:
+            raise Problem(error.what, error.remedy) from None
+        except BadKey as error:
+            raise Problem(str(error), "A key is one word: dia_...", ExitCode.AUTH) from None
 
     def close(self) -> None:
         """Closes the connections."""
@@ -173,7 +173,7 @@ class Transport:
             try:
                 response = self._client.request(
                     method,
-                    self.url + path,
+                    path,
                     json=json,
                     params=_present(params),
                     headers=dict(headers or {}),
@@ -200,7 +200,7 @@ class Transport:
             RefusedRequest: The server refused it.
             httpx.TransportError: The connection failed, at first or later.
         """
-        with self._client.stream("GET", self.url + path, headers=dict(headers)) as response:
+        with self._client.stream("GET", path, headers=dict(headers)) as response:
             self._answered = True
             if not response.is_success:
                 response.read()
@@ -286,16 +286,3 @@ def _reason(error: Exception) -> str:
 
 def _present(params: Mapping[str, Any] | None) -> dict[str, Any]:
     return {name: value for name, value in (params or {}).items() if value is not None}
-
-
-def _checked(url: str) -> str:
-    try:
-        parts = urlsplit(url)
-        good = parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
-    except ValueError:
-        good = False
-    if not good or parts.query or parts.fragment:
-        raise Problem("The server's URL is not valid.", "Write it like --url http://127.0.0.1:8035.")
-    if parts.username is not None or parts.password is not None:
-        raise Problem("The server's URL contains a password.", "Put the key into DIAPHANE_KEY, not into the URL.")
-    return url.rstrip("/")
