@@ -56,6 +56,10 @@ class Limits:
     """Bytes of one uploaded file, and of all files of a scene."""
     part_bytes: int = 32 << 20
     """Bytes of one part of an upload."""
+    webhooks: int = 32
+    """Webhooks of a service."""
+    webhook_url: int = 2000
+    """Characters of a webhook's URL."""
     scene_files: int = 4096
     """Files of a scene."""
     layers: int = 256

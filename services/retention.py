@@ -5,9 +5,10 @@ Never removed:
 - what the tasks of unfinished jobs make or read;
 - artifacts used within the hour, blobs used within the day: someone may be about to refer to them.
 
-Beyond that, jobs go `keep_days` after their end with their tasks and events; scenes and data sets when no job that is
-still listed names them; artifacts and blobs when nothing was read of them for `keep_days`, and earlier, the least
-recently used first, while all together are more than `keep_bytes`. What is removed and needed again is made again.
+Beyond that, jobs go `keep_days` after their end with their tasks and events, and so do deliveries of webhooks; scenes
+and data sets when no job that is still listed names them; artifacts and blobs when nothing was read of them for
+`keep_days`, and earlier, the least recently used first, while all together are more than `keep_bytes`. What is removed
+and needed again is made again.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import sqlalchemy as sa
 
 from schemas.job import FINAL_STATES
 from services.database import Database
-from services.database.tables import datasets, events, jobs, scenes, tasks, uploads, versions
+from services.database.tables import datasets, deliveries, events, jobs, scenes, tasks, uploads, versions
 from services.settings import Settings
 from services.storage import Blobs, Storage
 from services.store import Store
@@ -193,6 +194,7 @@ def _expire_rows(connection: sa.Connection, cutoff: float, recent: set[str]) -> 
     for details in (events, tasks):  # a job that published a version stays: it names the version's scenes
         connection.execute(details.delete().where(details.c.job_id.in_(sa.select(jobs.c.id).where(over))))
     gone_jobs = connection.execute(jobs.delete().where(over & jobs.c.id.not_in(publishers))).rowcount
+    connection.execute(deliveries.delete().where(deliveries.c.finished < cutoff))
     specs = connection.scalars(sa.select(jobs.c.spec)).all()
     used_scenes = {use["scene"] for spec in specs for use in spec.get("scenes", ())}
     old_scenes = connection.execute(sa.select(scenes.c.id, scenes.c.files).where(scenes.c.created < cutoff)).all()

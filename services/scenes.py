@@ -23,6 +23,7 @@ from services.database.tables import scenes as table
 from services.problems import Refusal
 from services.storage import Blobs
 from services.store import canonical_json
+from services.webhooks import outbox
 
 SUFFIXES = (".usd", ".usda", ".usdc", ".usdz", ".glb")
 """Of a file that can be opened as a scene."""
@@ -158,10 +159,13 @@ class Scenes:
         values: dict[str, Any] = {"state": "rejected" if problem else "accepted"}
         values["facts"] = None if facts is None else dict(facts)
         values["problem"] = None if problem is None else problem.model_dump(mode="json")
+        open_check = sa.and_(table.c.id == scene_id, table.c.state == "checking")
+        change = table.update().where(open_check).values(**values)
 
         def update(connection: sa.Connection) -> None:
-            open_check = sa.and_(table.c.id == scene_id, table.c.state == "checking")
-            connection.execute(table.update().where(open_check).values(**values))
+            changed = connection.execute(change.returning(table.c.id, table.c.name, table.c.created_by)).first()
+            if changed is not None and problem is not None:
+                outbox.scene_rejected(connection, changed, problem)
 
         self._database.retry(update)
 

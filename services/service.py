@@ -13,6 +13,8 @@ from services.scenes import Scenes
 from services.settings import Settings
 from services.storage import Storage, open_storage
 from services.uploads import Uploads
+from services.webhooks.addresses import networks_of
+from services.webhooks.hooks import Webhooks
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,7 @@ class Service:
         keys: API keys.
         measured: Measurements and data sets.
         uploads: Uploads under way.
+        webhooks: Who is told of what happens.
     """
 
     settings: Settings
@@ -40,6 +43,7 @@ class Service:
     keys: Keys
     measured: Measured
     uploads: Uploads
+    webhooks: Webhooks
 
 
 def open_service(settings: Settings) -> Service:
@@ -62,4 +66,5 @@ def open_service(settings: Settings) -> Service:
         keys=Keys(database),
         measured=Measured(database),
         uploads=Uploads(database, storage.blobs),
+        webhooks=Webhooks(database, networks_of(settings.webhook_networks)),
     )

@@ -48,6 +48,8 @@ class Settings(BaseSettings):
         job_pixels: Pixels of all views of a job, where its key has no bound of its own; keys with `admin` have none.
         job_steps: Optimiser steps of a job; the same.
         jobs: Jobs of a key that have not ended; the same.
+        webhook_networks: Addresses and networks, separated by commas, that webhooks may lead to beside public ones;
+            empty: none.
     """
 
     model_config = SettingsConfigDict(env_prefix="DIAPHANE_", frozen=True, extra="ignore")
@@ -80,6 +82,7 @@ class Settings(BaseSettings):
     job_pixels: int = Field(default=10**10, ge=1)
     job_steps: int = Field(default=100_000, ge=1)
     jobs: int = Field(default=100, ge=1)
+    webhook_networks: str = ""
 
     def __init__(self, **values: Any) -> None:
         try:
@@ -98,7 +101,7 @@ class Settings(BaseSettings):
             raise ValueError("DIAPHANE_TTL must be at least three times DIAPHANE_HEARTBEAT")
         return self
 
-    @field_validator("proxies")
+    @field_validator("proxies", "webhook_networks")
     @classmethod
     def _are_addresses(cls, text: str) -> str:
         for part in _parts(text):

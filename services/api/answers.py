@@ -24,6 +24,7 @@ from schemas.service import (
     TaskRecord,
     VersionRecord,
 )
+from schemas.webhook import WEBHOOK_EVENTS, DeliveryRecord, WebhookEvent, WebhookRecord
 from services.api.parts import PRINTED
 from services.problems import ProblemType
 
@@ -121,6 +122,20 @@ class CreatedKey(_Model):
     secret: str
 
 
+class NewWebhook(_Model):
+    """A webhook to be made: where it is delivered, and what it hears of; by default everything."""
+
+    url: Annotated[str, StringConstraints(min_length=1, max_length=LIMITS.webhook_url, pattern=r"^[\x21-\x7e]*$")]
+    events: list[WebhookEvent] = Field(default=list(WEBHOOK_EVENTS), min_length=1, max_length=len(WEBHOOK_EVENTS))
+
+
+class CreatedWebhook(_Model):
+    """A new webhook; the secret is shown this once."""
+
+    webhook: WebhookRecord
+    secret: str
+
+
 class AliasesRecord(_Model):
     """Where the aliases of a name point, and how they got there, latest move first."""
 
@@ -215,6 +230,18 @@ class KeyPage(_Model):
     """A page of keys."""
 
     items: list[KeyRecord]
+
+
+class WebhookPage(_Model):
+    """A page of webhooks."""
+
+    items: list[WebhookRecord]
+
+
+class DeliveryPage(_Model):
+    """A page of deliveries of a webhook."""
+
+    items: list[DeliveryRecord]
 
 
 class ProblemPage(_Model):

@@ -45,6 +45,7 @@ _EXAMPLES: dict[str, Any] = {
     "Move": {"version": "1.3.0", "reason": "Better on the terrace."},
     "Reasoned": {"reason": "Worse on the terrace than measured."},
     "NewKey": {"name": "ci", "scopes": ["submit"]},
+    "NewWebhook": {"url": "https://ci.example.org/diaphane", "events": ["job.failed", "model.champion"]},
     "Hashes": {"sha256": ["e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"]},
 }
 

@@ -13,6 +13,7 @@ from prometheus_client.exposition import CONTENT_TYPE_LATEST
 from prometheus_client.registry import Collector
 
 from schemas.job import JobState
+from schemas.webhook import DELIVERY_STATES
 from services.api.feeds import Feeds
 from services.database.tables import jobs
 from services.service import Service
@@ -92,7 +93,11 @@ class _Found(Collector):
         executors = GaugeMetricFamily("diaphane_executors_alive", "Living workers, by role.", labels=["role"])
         for role in ROLES:
             executors.add_metric([role], sum(role in roles for roles in alive))
-        yield from (waiting, running, states, executors)
+        hooks = GaugeMetricFamily("diaphane_webhook_deliveries", "Deliveries of webhooks, by state.", labels=["state"])
+        sent = self._service.webhooks.counts()
+        for delivery in DELIVERY_STATES:
+            hooks.add_metric([delivery], sent.get(delivery, 0))
+        yield from (waiting, running, states, executors, hooks)
 
 
 @router.get("", response_class=Response, responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}})

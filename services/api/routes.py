@@ -21,6 +21,7 @@ from services.api import (
     models,
     scenes,
     uploads,
+    webhooks,
     workers,
 )
 from services.api.body import JsonBody
@@ -35,6 +36,7 @@ GUARDED: tuple[APIRouter, ...] = (
     models.router,
     measurements.router,
     keys.router,
+    webhooks.router,
     workers.router,
     metrics.router,
 )

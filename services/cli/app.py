@@ -41,6 +41,7 @@ from services.cli import (
     storm,
     stress,
     view,
+    webhooks,
     worker,
     workers,
 )
@@ -73,6 +74,7 @@ app.add_typer(datasets.app, name="datasets")
 app.command("measurements")(measurements.measurements)
 app.add_typer(models.app, name="models")
 app.add_typer(keys.app, name="keys")
+app.add_typer(webhooks.app, name="webhooks")
 app.command("workers")(workers.workers)
 app.command("health")(health.health)
 

@@ -6,7 +6,7 @@ refresh parts of pages and show values of charts: everything works without them.
 
 from fastapi import APIRouter, Depends, FastAPI
 
-from services.dashboard import assets, compare, demo, jobs, models, overview, scenes, sign_in, sign_out
+from services.dashboard import assets, compare, demo, jobs, models, overview, scenes, sign_in, sign_out, webhooks
 from services.dashboard.live import Watch
 from services.dashboard.sessions import Sessions
 from services.dashboard.visitor import Visitor
@@ -18,6 +18,7 @@ PAGES: tuple[APIRouter, ...] = (
     models.router,
     scenes.router,
     compare.router,
+    webhooks.router,
     sign_out.router,
 )
 """Those that need a session."""

@@ -206,6 +206,36 @@ handovers = _table(
 )
 """Every change of the signing key; without a statement where the old key was lost."""
 
+webhooks = _table(
+    "webhooks",
+    sa.Column("id", sa.Text, primary_key=True),
+    sa.Column("url", sa.Text, nullable=False),
+    sa.Column("events", sa.JSON, nullable=False),
+    sa.Column("secret", sa.Text, nullable=False),
+    sa.Column("created", sa.Double, nullable=False),
+    sa.Column("created_by", sa.Text, nullable=False),
+)
+"""Who is told of what. The secret itself, for it signs what is sent: a hash of it could not."""
+
+deliveries = _table(
+    "deliveries",
+    sa.Column("id", sa.Text, primary_key=True),
+    sa.Column("webhook_id", sa.Text, sa.ForeignKey("webhooks.id", ondelete="CASCADE"), nullable=False, index=True),
+    sa.Column("event", sa.Text, nullable=False),
+    sa.Column("body", sa.Text, nullable=False),
+    sa.Column("state", sa.Text, nullable=False),  # waiting, delivered, failed
+    sa.Column("attempts", sa.Integer, nullable=False),
+    sa.Column("created", sa.Double, nullable=False),
+    sa.Column("due", sa.Double, nullable=False),
+    sa.Column("claim", sa.Text),
+    sa.Column("finished", sa.Double),
+    sa.Column("status", sa.Integer),
+    sa.Column("problem", sa.Text),
+    sa.Index("deliveries_due", "state", "due"),
+)
+"""What is told to whom, and what became of it. `due` is by the database's clock; while `claim` is set, it is the end of
+the lease."""
+
 measurements = _table(
     "measurements",
     sa.Column("id", sa.Integer, primary_key=True, autoincrement=True),

@@ -18,6 +18,7 @@ from schemas.problem import ExitCode, Problem
 from services.database import Database, tables
 from services.engine import queues, system
 from services.problems import document_of
+from services.webhooks import outbox
 
 if TYPE_CHECKING:
     from dbos import DBOSClient
@@ -84,8 +85,10 @@ def _give_up(database: Database, scene_id: str) -> None:
         "It probably exhausts the machine's memory: upload a simpler one.",
         ExitCode.LIMIT,
     )
-    values = {"state": "rejected", "problem": document_of(problem).model_dump(mode="json")}
-    table = tables.scenes
+    document, table = document_of(problem), tables.scenes
+    here = [table.c.id == scene_id, table.c.state == "checking"]
+    change = table.update().where(*here).values(state="rejected", problem=document.model_dump(mode="json"))
     with database.write() as connection:
-        here = [table.c.id == scene_id, table.c.state == "checking"]
-        connection.execute(table.update().where(*here).values(**values))
+        changed = connection.execute(change.returning(table.c.id, table.c.name, table.c.created_by)).first()
+        if changed is not None:
+            outbox.scene_rejected(connection, changed, document)

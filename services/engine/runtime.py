@@ -33,6 +33,8 @@ from services.problems import document_of, summary_of
 from services.settings import Settings
 from services.sources import sweep_sources
 from services.tasks import ROLES, Role
+from services.webhooks.addresses import networks_of
+from services.webhooks.deliverer import Deliverer
 
 if TYPE_CHECKING:
     from services.measured import Measured
@@ -138,10 +140,13 @@ class Runtime:
         self._housekeeping = Housekeeping(
             self.settings, self._database, self._jobs.client, self._parts.storage, conducts="jobs" in self.roles
         )
+        self._deliverer = Deliverer(self._database, networks_of(self.settings.webhook_networks))
         self._liveness.beat()  # before anything can be claimed
         self._launch()
         self._liveness.start()
         self._housekeeping.start()
+        if "jobs" in self.roles:
+            self._deliverer.start()
         log.info("taking work", executor=self.executor, roles=self.roles)
 
     def stop(self) -> None:
@@ -159,6 +164,7 @@ class Runtime:
         end = time.monotonic() + 3.0
         while self._claims.held() and time.monotonic() < end:
             time.sleep(0.02)
+        self._deliverer.stop()  # after the jobs that ended: they are news
         self._liveness.stop()
         DBOS.destroy(workflow_completion_timeout_sec=0)
         flow.use(None)

@@ -25,6 +25,7 @@ from schemas.job import FINAL_STATES
 from schemas.service import ProblemDocument
 from services.database import Database, tables
 from services.engine import events, system
+from services.webhooks import outbox
 
 T = TypeVar("T")
 
@@ -148,6 +149,7 @@ def close(
     connection.execute(tables.tasks.update().where(*open_tasks).values(state="cancelled", finished=time.time()))
     data: dict[str, Any] = {"state": state, "attempt": row.attempt}
     events.add(connection, row.id, ("state", data if document is None else {**data, "problem": document}))
+    outbox.job_ended(connection, row, state, problem, result)
 
 
 def cancel_tasks(connection: sa.Connection, database: Database, job_id: str, attempt: int) -> None:

@@ -15,6 +15,8 @@ from services.clock import iso
 from services.database import Database
 from services.database.tables import aliases, moves
 from services.registry.pointers import next_move
+from services.registry.records import CHAMPION
+from services.webhooks import outbox
 
 
 def local_user() -> str:
@@ -67,6 +69,8 @@ def move(database: Database, name: str, change: MoveRecord, *, only_from_before:
         values: dict[str, Any] = {"before": now, "after": change.after, "who": change.who, "why": change.why}
         values["at"] = next_move(connection, name, change.alias)
         connection.execute(moves.insert().values(name=name, alias=change.alias, **values))
+        if change.alias == CHAMPION:
+            outbox.champion_moved(connection, name, change, now)
 
     database.retry(body)
 

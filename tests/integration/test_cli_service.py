@@ -12,9 +12,12 @@ from typing import Any
 
 import pytest
 from support.live_service import FAILING_SEED, MENDED, Live, live_service
+from support.receiver import receiver
 
 import services
 from schemas.problem import ExitCode
+from schemas.webhook import WEBHOOK_EVENTS
+from services.cli import webhooks
 from services.cli.app import run
 
 ROOT = Path(services.__file__).parent.parent
@@ -93,6 +96,34 @@ def test_workers_data_sets_and_measurements_are_shown(capsys: pytest.CaptureFixt
         assert run(command) == ExitCode.OK
     assert run(["measurements", "--since", "yesterday"]) == ExitCode.USAGE
     assert run(["datasets", "show", "dst_" + "0" * 32]) == ExitCode.NOT_FOUND
+
+
+def test_webhooks_are_made_tested_and_removed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert webhooks.EVENTS == WEBHOOK_EVENTS
+    with receiver() as there:
+        made = answer(["webhooks", "create", there.url, "--event", "model.champion"], capsys)
+        hook, secret = made["webhook"]["id"], made["secret"]
+        assert (made["webhook"]["url"], made["webhook"]["events"]) == (there.url, ["model.champion"])
+        assert answer(["webhooks", "list"], capsys) == {"webhooks": [made["webhook"]]}
+        there.answers += [200, 500]
+        sent = answer(["webhooks", "test", hook], capsys)
+        assert (sent["state"], sent["status"]) == ("delivered", 200)
+        assert there.messages[0].verified(secret)["type"] == "webhook.test"
+        assert run(["webhooks", "test", hook]) == ExitCode.CHECK_FAILED
+        assert "The receiver answered 500." in capsys.readouterr().err
+        found = answer(["webhooks", "deliveries", hook], capsys)["deliveries"]
+        assert [(one["state"], one["status"]) for one in found] == [("waiting", 500), ("delivered", 200)]
+        for command in (["webhooks", "list"], ["webhooks", "deliveries", hook], ["webhooks", "delete", hook]):
+            assert run(command) == ExitCode.OK
+            assert secret not in capsys.readouterr().out
+    assert run(["webhooks", "create", there.url]) == ExitCode.OK
+    assert capsys.readouterr().out.startswith("whsec_")
+    (left,) = answer(["webhooks", "list"], capsys)["webhooks"]
+    assert run(["webhooks", "delete", left["id"]]) == ExitCode.OK
+    assert run(["webhooks", "delete", left["id"]]) == ExitCode.NOT_FOUND
+    assert run(["webhooks", "test", "../keys"]) == ExitCode.USAGE
+    assert run(["webhooks", "create", "http://10.0.0.1/"]) == ExitCode.USAGE
+    assert run(["webhooks", "create", "https://ci.example.org", "--event", "x"]) == ExitCode.USAGE
 
 
 def test_keys_come_and_go(live: Live, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,6 +17,7 @@ from sqlalchemy.exc import OperationalError
 from support.api import Api
 from support.dashboard import HOSTILE, ORIGIN, Shown, Visitor, fill
 from support.postgres import Postgres
+from support.receiver import LOOPBACK, receiver
 
 from services.api.routes import GUARDED, OPEN, routes
 from services.dashboard import OPEN_PAGES, PAGES, SESSION_ANSWERS, assets, models
@@ -24,6 +25,8 @@ from services.dashboard.page import duration, is_local
 from services.dashboard.sessions import form_token
 from services.database import Database, tables
 from services.engine.progress import STAGES_OF
+from services.webhooks.addresses import networks_of
+from services.webhooks.deliverer import Deliverer
 
 PARTS = {
     "job_id": "job_" + "0" * 24,
@@ -33,6 +36,7 @@ PARTS = {
     "file": "model.onnx",
     "key": "0" * 64,
     "kind": "k",
+    "webhook_id": "whk_" + "0" * 24,
 }
 PLACES = [(method, route.path.format_map(PARTS)) for route in routes(PAGES) for method in sorted(route.methods or ())]
 LISTS = ("/", "/jobs", "/models", "/scenes")
@@ -172,6 +176,9 @@ def _forms(shown: Shown) -> list[tuple[str, str, dict[str, str]]]:
         ("/models/glass/promote", "publish", move),
         ("/models/glass/rollback", "publish", {"alias": "champion", "reason": "a test"}),
         ("/sign-out", "read", {}),
+        ("/webhooks", "admin", {"url": "https://ci.example.org/", "job.failed": "on"}),
+        (f"/webhooks/{PARTS['webhook_id']}/test", "admin", {}),
+        (f"/webhooks/{PARTS['webhook_id']}/delete", "admin", {}),
     ]
 
 
@@ -193,6 +200,7 @@ def test_every_form_needs_its_token_its_origin_and_its_scope(api: Api, shown: Sh
         assert able.client.post(path, json=fields, headers={"Origin": ORIGIN}).status_code == 415
         for other, visitor in visitors.items():
             sufficient = {"read": set(api.secrets), "submit": {"submit", "admin"}, "publish": {"publish", "admin"}}
+            sufficient["admin"] = {"admin"}
             if other not in sufficient[scope]:
                 assert visitor.post(path, **fields).status_code == 403
     assert _state(api) == before
@@ -226,6 +234,40 @@ def test_forms_do_what_they_say(tmp_path: Path) -> None:
     assert admin.post("/models/glass/promote", version="9.9.9", alias="champion", reason="x").status_code == 404
     assert admin.post("/models/glass/promote", version="1.0.0", alias="Bad Alias", reason="x").status_code == 422
     assert admin.post("/models/glass/rollback", alias="champion", reason="  ").status_code == 422
+
+
+def test_a_webhook_is_made_tested_and_removed_in_the_dashboard(tmp_path: Path) -> None:
+    api = Api(tmp_path, webhook_networks=LOOPBACK)
+    admin = Visitor(api)
+    for scope in ("read", "submit", "publish"):
+        visitor = Visitor(api, scope)
+        assert visitor.get("/webhooks").status_code == 403
+        assert 'href="/webhooks"' not in visitor.get("/jobs").text
+    assert 'href="/webhooks"' in admin.get("/jobs").text
+    assert "There is no webhook yet." in admin.get("/webhooks").text
+    with receiver() as there:
+        url = f"{there.url}/<script>"
+        made = admin.post("/webhooks", url=url, **{"job.failed": "on", "model.champion": "on"})
+        secret = re.search(r"whsec_[\w+/=]+", made.text)
+        assert (made.status_code, made.headers["cache-control"], secret is not None) == (200, "no-store", True)
+        (hook,) = api.service.webhooks.list()
+        assert (hook.url, hook.events) == (url, ("job.failed", "model.champion"))
+        tested = admin.post(f"/webhooks/{hook.id}/test")
+        assert (tested.status_code, tested.headers["location"]) == (303, f"/webhooks#{hook.id}")
+        waiting = admin.get("/webhooks").text
+        assert 'hx-trigger="every 2s"' in waiting
+        assert ("s-waiting" in waiting, "whsec_" in waiting, "<script>" in waiting) == (True, False, False)
+        there.answers.append(500)
+        assert Deliverer(api.service.database, networks_of(LOOPBACK)).deliver() == 1
+        page = admin.get("/webhooks").text
+        assert ("every 2s" in page, "The receiver answered 500." in page) == (False, True)
+        assert secret is not None
+        assert there.messages[0].verified(secret[0])["type"] == "webhook.test"
+    assert admin.post("/webhooks", url="http://10.0.0.1/", **{"job.failed": "on"}).status_code == 422
+    assert "at least one event" in admin.post("/webhooks", url="https://ci.example.org/").text
+    assert admin.post(f"/webhooks/{hook.id}/delete").headers["location"] == "/webhooks"
+    assert admin.post(f"/webhooks/{hook.id}/delete").status_code == 404
+    assert api.service.webhooks.list() == []
 
 
 def test_moves_of_aliases_name_the_key_that_made_them(tmp_path: Path) -> None:

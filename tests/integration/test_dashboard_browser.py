@@ -56,6 +56,7 @@ def _pages(shown: Shown) -> dict[str, str]:
         "models": "/models",
         "model": "/models/glass",
         "scenes": "/scenes",
+        "webhooks": "/webhooks",
         "scene": f"/scenes/{shown.scene}",
         "scene-rejected": f"/scenes/{shown.rejected}",
     }

@@ -68,11 +68,17 @@ def test_ports_are_published_on_loopback_only() -> None:
     assert all(port.startswith("127.0.0.1:") for port in published["api"])
 
 
-def test_workers_reach_the_database_and_the_store_only() -> None:
+def test_workers_that_open_scenes_reach_the_database_and_the_store_only() -> None:
+    """Webhooks are delivered by who conducts jobs: it reaches others, and nobody reaches it."""
     assert compose()["networks"]["data"]["internal"] is True
-    workers = [service for name, service in own_services().items() if name != "api"]
-    assert workers
-    assert all(service["networks"] == ["data"] for service in workers)
+    reach = {name: service["networks"] for name, service in own_services().items()}
+    assert {name for name, networks in reach.items() if networks != ["data"]} == {"api", "jobs"}
+    assert reach["jobs"] == ["data", "edge"]
+
+
+def test_who_takes_webhooks_and_who_delivers_them_agree_on_where_they_may_lead() -> None:
+    names = {n for n, s in own_services().items() if "DIAPHANE_WEBHOOK_NETWORKS" in s["environment"]}
+    assert names == {"api", "jobs"}
 
 
 def test_only_who_publishes_has_the_signing_key() -> None:

@@ -23,6 +23,7 @@ from schemas.problem import ExitCode, Problem
 from schemas.service import SceneRecord
 from services.tasks import Runner, Task
 from support.bundles import make_bundle
+from support.receiver import LOOPBACK
 from support.workers import until
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -77,7 +78,7 @@ def live_service(folder: Path) -> Iterator[Live]:
     """A service; stopped at the end."""
     environment = {k: v for k, v in os.environ.items() if not k.startswith("DIAPHANE_")}
     environment |= {"PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'tests'}", "DIAPHANE_STATE": str(folder)}
-    environment |= {"DIAPHANE_POLL": "0.05", "DIAPHANE_DRAIN_SECONDS": "1"}
+    environment |= {"DIAPHANE_POLL": "0.05", "DIAPHANE_DRAIN_SECONDS": "1", "DIAPHANE_WEBHOOK_NETWORKS": LOOPBACK}
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "log").open("w") as log:
         command = [sys.executable, "-m", "support.live_service"]
