@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -12,9 +11,6 @@ from services.cli import output
 from services.cli.lines import plain, print_columns
 from services.cli.server import DEFAULT_URL, KeyFileOption, LimitOption, UrlOption, connect
 from services.cli.state import JsonOption
-
-if TYPE_CHECKING:
-    from services.cli.webhook_calls import WebhookCalls
 
 app = typer.Typer(
     help="Webhooks: tell other servers of ended jobs, rejected scenes and new champions (needs an admin key).",
@@ -40,7 +36,7 @@ def create(
     unknown = sorted(set(event or ()) - set(EVENTS))
     if unknown:
         raise Problem(f"There is no event '{unknown[0]}'.", f"Choose among {', '.join(EVENTS)}: --event job.failed.")
-    made = _calls(url, key_file).create(receiver, event or ())
+    made = connect(url, key_file).webhooks.create(receiver, event or ())
     if as_json:
         output.print_json(made)
         return
@@ -52,7 +48,7 @@ def create(
 @app.command("list")
 def list_(url: UrlOption = DEFAULT_URL, key_file: KeyFileOption = None, as_json: JsonOption = False) -> None:
     """All webhooks, without their secrets."""
-    found = list(_calls(url, key_file).list())
+    found = connect(url, key_file).webhooks.list()
     if as_json:
         output.print_json({"webhooks": found})
         return
@@ -63,7 +59,7 @@ def list_(url: UrlOption = DEFAULT_URL, key_file: KeyFileOption = None, as_json:
 @app.command()
 def delete(webhook_id: IdArgument, url: UrlOption = DEFAULT_URL, key_file: KeyFileOption = None) -> None:
     """Remove a webhook, with what still waits for it."""
-    _calls(url, key_file).delete(webhook_id)
+    connect(url, key_file).webhooks.delete(webhook_id)
     print(f"{webhook_id} is removed.")
 
 
@@ -78,7 +74,7 @@ def send_test(
     as_json: JsonOption = False,
 ) -> None:
     """Send the event webhook.test, and print what became of it."""
-    sent = _calls(url, key_file).test(webhook_id, wait)
+    sent = connect(url, key_file).webhooks.test(webhook_id, wait)
     if as_json:
         output.print_json(sent)
     else:
@@ -102,19 +98,12 @@ def deliveries(
     as_json: JsonOption = False,
 ) -> None:
     """What was sent, newest first, and what became of it."""
-    found = list(_calls(url, key_file).deliveries(webhook_id, limit))
+    found = connect(url, key_file).webhooks.deliveries(webhook_id, limit)
     if as_json:
         output.print_json({"deliveries": found})
         return
     rows = [(one["id"], one["event"], _state(one), one["attempts"], one["created"], one["problem"]) for one in found]
     print_columns(("id", "event", "state", "attempts", "happened", "problem"), rows)
-
-
-def _calls(url: str, key_file: Path | None) -> WebhookCalls:
-    # Imported late: `diaphane --help` does not need a HTTP client.
-    from services.cli.webhook_calls import WebhookCalls
-
-    return WebhookCalls(connect(url, key_file).transport)
 
 
 def _state(delivery: dict[str, Any]) -> str:

@@ -13,6 +13,7 @@ from services.client.models import Models
 from services.client.records import Record, Records
 from services.client.scenes import Scenes
 from services.client.transport import Transport
+from services.client.webhooks import Webhooks
 
 
 class Client(Group):
@@ -29,6 +30,7 @@ class Client(Group):
         models: Versions, aliases, verified downloads.
         datasets: Label shards that trainings learn from.
         keys: Who may ask.
+        webhooks: Who hears of what happens.
 
     Raises:
         Problem: The URL is not one, or carries a password.
@@ -42,6 +44,7 @@ class Client(Group):
         self.models = Models(self._transport, key)
         self.datasets = Datasets(self._transport)
         self.keys = Keys(self._transport)
+        self.webhooks = Webhooks(self._transport)
 
     def __enter__(self) -> Self:
         return self
