@@ -125,7 +125,9 @@ class CreatedKey(_Model):
 class NewWebhook(_Model):
     """A webhook to be made: where it is delivered, and what it hears of; by default everything."""
 
-    url: Annotated[str, StringConstraints(min_length=1, max_length=LIMITS.webhook_url, pattern=r"^[\x21-\x7e]*$")]
+    url: Annotated[
+        str, StringConstraints(min_length=1, max_length=LIMITS.webhook_url, pattern=r"^https?://[\x21-\x7e]+$")
+    ]
     events: list[WebhookEvent] = Field(default=list(WEBHOOK_EVENTS), min_length=1, max_length=len(WEBHOOK_EVENTS))
 
 

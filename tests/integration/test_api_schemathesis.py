@@ -32,8 +32,10 @@ checks.positive_data_acceptance.expected-statuses = ["2xx", "3xx", "401", "403",
 
 [[operations]]
 # Also 422: fields that depend on each other (a build needs a name, the root is one of the files, a hash has to hold, a
-# key ends in the future). Also 413: how much a key may ask for, and how much of a file is left, is not in the document.
-include-operation-id = ["submit_job", "create_scene", "begin_upload", "append_part", "create_key"]
+# key ends in the future), and what follows the scheme of a webhook's URL: a host, which is public if it is an address.
+# Also 413: how much a key may ask for, how much of a file is left, and how many webhooks there may be, is not in the
+# document.
+include-operation-id = ["submit_job", "create_scene", "begin_upload", "append_part", "create_key", "create_webhook"]
 checks.positive_data_acceptance.expected-statuses = ["2xx", "3xx", "401", "403", "404", "409", "413", "422", "429"]
 """
 

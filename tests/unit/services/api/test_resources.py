@@ -311,7 +311,7 @@ def test_a_scene_is_advised_on_by_what_was_measured_on_it(api: Api) -> None:
     )
     tight = api.get(f"/v1/scenes/{scene}/advice?memory=8KiB").json()
     assert (tight["choice"]["verdict"], tight["choice"]["chosen"]["technique"]) == ("technique", "kbuffer")
-    assert "Use kbuffer (budget 1, density tail)" in tight["text"][0]
+    assert "Use fixed k (kbuffer), budget 1, density tail" in tight["text"][0]
     large = api.get(f"/v1/scenes/{scene}/advice?memory=8KiB&size=1920x1080").json()
     assert large["choice"]["verdict"] == "none"
     assert api.get(f"/v1/scenes/{scene}/advice?memory=8").status_code == 422
