@@ -20,6 +20,7 @@ _PLACES: Final[Mapping[str, str]] = {
 PATTERNS: Final[Mapping[str, str]] = {
     r"^[^\x00-\x1f\x7f]*$": "text of one line without control characters",
     r"^[!-~]+$": "printable ASCII without spaces",
+    r"^https?://[\x21-\x7e]+$": "an address that begins with http:// or https://, in ASCII without spaces",
     r"^[0-9]{0,5}$": "a whole number of at most five digits, or empty",
     r"^[0-9a-f]{64}$": "a sha256: 64 hex digits in small letters",
     r"^[0-9a-f]{0,16}$": "what the page was given: at most 16 hex digits",

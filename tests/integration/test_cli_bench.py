@@ -84,10 +84,10 @@ def test_it_prints_tables_and_leaves_json_plots_and_a_page(
     assert cells["sbuffer"].work["capture"].atomics == result.views[0].fragments
     assert cells["kbuffer-optimal"].work.keys() == cells["kbuffer-optimal"].passes.keys() - {"opaque", "readback"}
     assert result.device.bandwidth == 250.0
-    for plot in ("time-error", "error-bytes", "figure6"):
+    for plot in ("time-error", "error-bytes", "figure6-1"):
         assert json.loads((folder / "out" / f"{plot}.vl.json").read_text())["data"]["values"]
     page = (folder / "out" / "index.html").read_text()
-    assert "<svg" in page
+    assert page.count("<img") == 5, "the view, and its spot: exact, moment, kbuffer, kbuffer-optimal"
     assert "Work of a frame, counted" in page
     assert "250 GB/s and 50 Gfragments/s" in page
     assert not (folder / ".diaphane").exists(), "it runs without state"
