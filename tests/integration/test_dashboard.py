@@ -15,6 +15,7 @@ from fastapi.routing import APIRoute
 from PIL import Image
 from sqlalchemy.exc import OperationalError
 from support.api import Api
+from support.charts import DATA
 from support.dashboard import HOSTILE, ORIGIN, Shown, Visitor, fill
 from support.postgres import Postgres
 from support.receiver import LOOPBACK, receiver
@@ -40,8 +41,6 @@ PARTS = {
 }
 PLACES = [(method, route.path.format_map(PARTS)) for route in routes(PAGES) for method in sorted(route.methods or ())]
 LISTS = ("/", "/jobs", "/models", "/scenes")
-DATA = re.compile(r"<script type=\"application/json\">[^<]*</script>")
-"""What a chart shows: a block of data, which no browser runs."""
 
 
 @pytest.fixture(scope="module")

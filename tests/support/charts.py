@@ -1,12 +1,16 @@
-"""One chart of each kind."""
+"""One chart of each kind, and how pages hold them."""
 
 from __future__ import annotations
+
+import re
 
 from services.report.dots import Dot, error_dots
 from services.report.fronts import Point, error_chart
 from services.report.lines import curve_chart, history_chart, log_log, loss_chart
 from services.report.vega import Spec
 
+DATA = re.compile(r"<script type=\"application/json\">[^<]*</script>")
+"""What a chart shows: a block of data, which no browser runs."""
 POINTS = [Point("kbuffer", 1.0, 4.0, 1e-4), Point("kbuffer", 2.0, 6.0, 2e-5), Point("sbuffer", None, 9.0, 0.0)]
 _MADE: dict[str, Spec | None] = {
     "error": error_chart(POINTS, "</script><b> & bottles"),
