@@ -11,7 +11,7 @@ from schemas.measurement import Measurement, RegistryResult
 from services import summary
 from services.looks import title
 
-HEADINGS: Final = ("F / (W H)", "technique", "MSE x1e-5", "/ VKB", "PSNR dB", "FLIP", "ms")
+HEADINGS: Final = ("F / WH", "technique", "MSE x1e-5", "/ VKB", "PSNR dB", "FLIP", "ms")
 """Of `BuildResult.table`; the first two are of columns of text."""
 UNPROVEN: Final = (
     "No view of a scene that was held out was scored, so nothing is proven: give a second transparent scene."

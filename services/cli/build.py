@@ -78,15 +78,18 @@ def build(
 
 
 def _show(options: BuildOptions, result: BuildResult) -> None:
+    from rich import box
     from rich.table import Table
 
     from services.result import HEADINGS
 
     console = output.out()
     if rows := result.table():
-        table = Table(title=f"Held out: {', '.join(result.held_out)}", title_justify="left")
+        # As narrow as that, no number is cut off in 80 columns.
+        title = f"Held out: {', '.join(result.held_out)}"
+        table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
         for i, heading in enumerate(HEADINGS):
-            table.add_column(heading, justify="left" if i < 2 else "right", no_wrap=i < 2)
+            table.add_column(heading, justify="left" if i < 2 else "right", no_wrap=True)
         for row in rows:
             table.add_row(*row)
         console.print(table)

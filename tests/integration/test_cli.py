@@ -157,6 +157,7 @@ def test_build_prints_the_table_and_where_the_report_is(
     captured = capsys.readouterr()
     assert "Report: .diaphane/report.html" in captured.out
     assert "bundle (kbuffer-deep)" in captured.out
+    assert "…" not in captured.out, "nothing is cut off in 80 columns"
     assert "Nothing had to be done" in captured.out
     assert "render: 1" in captured.err
 

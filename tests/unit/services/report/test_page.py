@@ -103,6 +103,11 @@ def test_the_page_says_what_was_measured(tmp_path: Path) -> None:
         assert words in text
 
 
+def test_a_wide_table_scrolls_and_the_page_does_not(tmp_path: Path) -> None:
+    html, _ = write(tmp_path)
+    assert html.count("<table") == html.count('<div class="scroll"><table>') > 0
+
+
 def test_every_anchor_leads_somewhere(tmp_path: Path) -> None:
     html, _ = write(tmp_path)
     targets = re.findall(r'href="#([^"]+)"', html)
