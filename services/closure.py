@@ -20,9 +20,9 @@ from functools import cache
 from pathlib import Path
 from typing import Final
 
-from services.versions import ROOT
+from evaluation.versions import ROOT
 
-PACKAGES: Final = ("schemas", "renderer", "labeller", "trainer", "stress", "services")
+PACKAGES: Final = ("schemas", "renderer", "labeller", "trainer", "stress", "evaluation", "services")
 
 _OWN = rf"(?:{'|'.join(PACKAGES)})(?:\.\w+)*"
 _NOT_RUN = re.compile(r"^([ \t]*)if TYPE_CHECKING:\n(?:\1[ \t]+.*\n|[ \t]*\n)*", re.MULTILINE)

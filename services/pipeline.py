@@ -9,12 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from evaluation import summary
 from schemas.bundle import load_manifest, network_digest, write_card
 from schemas.job import JobSpec
 from schemas.measurement import Measurement, RegistryResult, SceneSummary
 from schemas.problem import ExitCode, Problem
 from schemas.service import SceneRecord, ShardRef
-from services import budgets, steps, summary
+from services import budgets, steps
 from services.acceptance import begun_plan
 from services.fine_tuning import without_champion
 from services.model_card import command_of, model_card

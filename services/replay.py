@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from evaluation.progress import Progress
 from labeller.dataset import Dataset, open_dataset
 from labeller.dataset_index import INDEX, Labels, ShardEntry
 from labeller.sampling import Sampling
@@ -17,7 +18,6 @@ from schemas.bundle import Manifest, load_manifest
 from services.fine_tuning import check_labels, is_replayed, refuse_known, scenes_of
 from services.options import BuildOptions
 from services.plan import Plan, source_of_version
-from services.progress import Progress
 from services.registry import Registry, bundle_digest
 from services.stages.inputs import METRIC
 from services.tasks import Source

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import PurePath
 
+from evaluation.scene_warnings import said_warnings
 from schemas.measurement import Certificate, Measurement
 from schemas.problem import ExitCode, Problem
 from schemas.skips import OPAQUE_SCENES, OPAQUE_VIEWS
 from services.plan import Plan, PlannedScene
 from services.records import Bundle, EvaluatedView, LabelledView, RenderedView, SceneEntry
-from services.scene_warnings import said_warnings
 from services.stages.evaluate import EVALUATE
 from services.stages.export import EXPORT
 from services.stages.inputs import EvaluateFacts

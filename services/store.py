@@ -35,6 +35,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from schemas.canonical import canonical_json, file_sha256
 from schemas.problem import ExitCode, Problem
 
 META = "meta.json"
@@ -46,22 +47,6 @@ TOUCH_SECONDS = 600.0
 _ARTIFACT = re.compile(r"[a-z][a-z0-9-]{0,31}/[0-9a-f]{64}")
 
 log = logging.getLogger(__name__)
-
-
-def canonical_json(value: Any) -> str:
-    """The one text of a JSON value: sorted keys, no spaces, ASCII.
-
-    Raises:
-        ValueError: It contains NaN or an infinity.
-        TypeError: It contains something that JSON has no form for.
-    """
-    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=True)
-
-
-def file_sha256(path: Path) -> str:
-    """Hex sha256 of a file's bytes."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 @dataclass(frozen=True)

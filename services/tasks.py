@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol, get_args
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
-from services.progress import Progress
+from evaluation.progress import Progress
 from services.store import Address, Store
 
 if TYPE_CHECKING:

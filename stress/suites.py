@@ -11,7 +11,7 @@ from schemas.problem import Problem
 from stress import bounds, gl_bounds
 from stress.findings import Broken, NotRun, Options, Row, Suite
 
-_OURS: Final = ("schemas", "renderer", "labeller", "trainer", "stress", "services")
+_OURS: Final = ("schemas", "renderer", "labeller", "trainer", "stress", "evaluation", "services", "diaphane")
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from evaluation.pictures import read_png
+from evaluation.report.lines import curve_chart
+from evaluation.report.vega import Spec
 from labeller import pixel as curves
 from labeller.reference import Pixel, pixel_of
 from schemas.colour import display8
@@ -18,11 +21,8 @@ from schemas.problem import ExitCode, Problem
 from schemas.tail import MetricName, TailName
 from services.dashboard.sides import Side
 from services.kept import Kept
-from services.report.lines import curve_chart
-from services.report.vega import Spec
 from services.stages.evaluate import evaluated_from
 from services.stages.inputs import METRIC
-from services.stages.pictures import read_png
 from services.store import Address, MissingArtifact, Store
 
 if TYPE_CHECKING:

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any, cast
 
 import structlog
 
+from evaluation.progress import Stage
 from schemas.problem import ExitCode, Problem
 from services.database import Database
 from services.engine import states, system
 from services.engine.claims import Claims
 from services.engine.states import Abandoned, Claim
 from services.engine.tasks import Tasks
-from services.progress import Stage
 from services.stages.catalogue import STAGES
 from services.store import MissingArtifact, StoreAway
 from services.tasks import FACTS, JsonFacts, StageName, Task
@@ -55,21 +55,21 @@ class JobProgress:
 
     @contextmanager
     def stage(self, name: str, total: int) -> Iterator[Stage]:
-        """See `services.progress.Progress`; the runner itself tells the stages."""
+        """See `evaluation.progress.Progress`; the runner itself tells the stages."""
         yield _NoStage()
 
     def note(self, text: str) -> None:
-        """See `services.progress.Progress`."""
+        """See `evaluation.progress.Progress`."""
         self._once("note", lambda: states.note(self._database, self._job_id, ("log", {"text": text})))
 
     def skipped(self, what: str, count: int = 1) -> None:
-        """See `services.progress.Progress`."""
+        """See `evaluation.progress.Progress`."""
         self.skips[what] += count
 
 
 class _NoStage:
     def advance(self, n: int = 1, note: str = "") -> None:
-        """See `services.progress.Stage`."""
+        """See `evaluation.progress.Stage`."""
 
 
 class DurableRunner:

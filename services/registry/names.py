@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from schemas.bundle import CARD, FILES, MANIFEST
+from schemas.canonical import canonical_json, file_sha256
 from schemas.problem import Problem
 from schemas.service import FileRef
-from services.store import canonical_json, file_sha256
 
 _NAME = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,61}[a-z0-9])?")
 

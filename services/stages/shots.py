@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from evaluation.pictures import EXACT, counts_map, quantise_map, stem, write_png
 from labeller.curves import composite
 from renderer import metrics
 from renderer.dump import read_dump
@@ -25,7 +26,6 @@ from schemas.problem import ExitCode, Problem
 from schemas.tail import TailName
 from services.stages.desk import Desk
 from services.stages.evaluate import EvaluateParams
-from services.stages.pictures import EXACT, counts_map, quantise_map, stem, write_png
 from services.tasks import Task
 
 AGREEMENT = 1

@@ -30,9 +30,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
+from schemas.canonical import file_sha256
 from schemas.problem import ExitCode, Problem
 from schemas.service import FileRef
-from services.store import TOUCH_SECONDS, StoreAway, file_sha256, sync
+from services.store import TOUCH_SECONDS, StoreAway, sync
 
 CHUNK = 1 << 20
 """Bytes read and written at a time."""

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from evaluation.pictures import read_png
 from labeller.curves import composite
 from renderer.dump import write_dump
 from renderer.exr import read_exr
@@ -17,7 +18,6 @@ from schemas.fragments import FragmentDump
 from schemas.glass import DEFAULT_GLASS
 from schemas.view import View
 from services.stages.evaluate import EvaluateParams
-from services.stages.pictures import read_png
 from services.stages.shots import Session, Shot
 
 

@@ -16,6 +16,7 @@ PACKAGES = (
     "labeller",
     "trainer",
     "stress",
+    "evaluation",
     "services",
     "diaphane",
     "deploy/client/python/diaphane_client",

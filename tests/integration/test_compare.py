@@ -18,6 +18,8 @@ from support.compare import CAMERA, FACTORS, HOSTILE_VIEW, MODELS, RULES, TAIL, 
 from support.dashboard import Visitor
 from support.postgres import Postgres
 
+from evaluation.pictures import counts_map, read_png, write_png
+from evaluation.report import colours
 from labeller import reference
 from labeller.hull import lower_hulls
 from renderer import metrics
@@ -32,9 +34,7 @@ from services.dashboard.compare import Comparer
 from services.dashboard.measured import history, of_version
 from services.dashboard.pixels import RULE_TITLES
 from services.kept import Kept
-from services.report import colours
 from services.scene_views import views
-from services.stages.pictures import counts_map, read_png, write_png
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from evaluation.pictures import counts_map, quantise_map, stem, write_png
 from labeller.allocation import RuleName
 from labeller.curves import Curves, composite, error_curves
 from labeller.rules import allocate_curves
@@ -22,7 +23,6 @@ from schemas.view import View as Camera
 from services.stages.desk import save_facts
 from services.stages.label import LABEL, LabelParams
 from services.stages.making import label as making
-from services.stages.pictures import counts_map, quantise_map, stem, write_png
 from services.store import Address
 from support.api import Api, measurement
 from support.dumps import random_dump

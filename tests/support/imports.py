@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+from evaluation.versions import ROOT
 from services.closure import PACKAGES
-from services.versions import ROOT
 
 
 @cache

@@ -8,11 +8,11 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from evaluation.progress import SilentProgress
 from schemas.bundle import CARD
 from schemas.measurement import Measurement
 from schemas.service import DatasetRecord, SceneRecord, ShardRef
 from schemas.tail import DEFAULT_TAIL, DENSITY_G
-from services.progress import SilentProgress
 from services.stages.desk import BUNDLE
 from services.tasks import JsonFacts, StageName, Task
 from support.bundles import make_bundle

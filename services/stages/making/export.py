@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from evaluation.versions import diaphane_version, machine
 from labeller.shards import read_shard
 from renderer.context import gl_context
 from schemas.bundle import WEIGHTS, Provenance, TailSpec
+from schemas.canonical import file_sha256
 from schemas.glass import DEFAULT_GLASS
 from schemas.pixel_weights import DEFAULT_WEIGHTS
 from services.registry import bundle_digest
 from services.stages.desk import BUNDLE, SHARD, Desk, load_facts
 from services.stages.export import ExportFacts, ExportParams
 from services.stages.inputs import METRIC, TrainFacts
-from services.store import file_sha256
 from services.tasks import Report, Task
-from services.versions import diaphane_version, machine
 from trainer.bundle import Description, export_bundle
 from trainer.weights import load_weights
 

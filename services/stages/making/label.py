@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeVar
 
+from evaluation.wording import counted
 from labeller.allocation import RULES, Allocation
 from labeller.curves import error_curves, whole_bins
 from labeller.flip_weights import flip_weights
@@ -18,7 +19,6 @@ from services.stages.allocations import write_allocations
 from services.stages.desk import SHARD, Desk
 from services.stages.label import Certified, LabelFacts, LabelParams, Shard
 from services.tasks import Report, Task
-from services.wording import counted
 
 Answer = TypeVar("Answer")
 

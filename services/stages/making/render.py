@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from evaluation.wording import counted
 from renderer.capture import capture
 from renderer.dump import write_dump
 from services.stages.desk import Desk
 from services.stages.pictured import Pictured
 from services.stages.render import RenderFacts
 from services.tasks import Report, Task
-from services.wording import counted
 
 
 def make(desk: Desk, task: Task, params: Pictured, folder: Path, report: Report) -> RenderFacts:

@@ -10,19 +10,19 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from evaluation import summary
+from evaluation.advice.gathered import of_measurements
+from evaluation.advice.page import part
+from evaluation.pictures import EXACT, read_png, stem
+from evaluation.report import Picture, PictureSet, write_report
+from evaluation.versions import library_versions, machine
 from renderer.context import describe, gl_context
+from schemas.canonical import file_sha256
 from schemas.measurement import Measurement, ReportData
-from services import summary
-from services.advice.gathered import of_measurements
-from services.advice.page import part
-from services.report import Picture, PictureSet, write_report
 from services.stages.desk import PAGE, Desk, load_facts
 from services.stages.inputs import EvaluateFacts
-from services.stages.pictures import EXACT, read_png, stem
 from services.stages.report import ReportFacts, ReportParams
-from services.store import file_sha256
 from services.tasks import Report, Task
-from services.versions import library_versions, machine
 
 SHOWN_VIEWS = 2
 """Views of each held-out scene whose pictures go into the report: more would make the file unwieldy."""

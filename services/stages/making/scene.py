@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from evaluation.wording import counted
 from renderer.usd.licence import authored_licence
 from renderer.views import placed_views, scene_views
+from schemas.canonical import file_sha256
 from services.stages.desk import Desk
 from services.stages.scene import SceneFacts, SceneParams
-from services.store import file_sha256
 from services.tasks import Report, Task
-from services.wording import counted
 
 
 def make(desk: Desk, task: Task, params: SceneParams, folder: Path, report: Report) -> SceneFacts:

@@ -6,10 +6,10 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
+from evaluation.report.live import write_live
 from labeller.dataset import open_dataset
 from schemas.bundle import WEIGHTS
 from schemas.measurement import TrainingPoint
-from services.report.live import write_live
 from services.stages.desk import SHARD, Desk
 from services.stages.inputs import TrainedOn, TrainFacts, trained_on
 from services.stages.train import TrainParams

@@ -71,9 +71,9 @@ def _train(task: Any, folder: Path, desk: Any) -> dict[str, Any]:
 
 
 def _export(task: Any, folder: Path, desk: Any) -> dict[str, Any]:
+    from schemas.canonical import file_sha256
     from services.registry import bundle_digest
     from services.stages.desk import BUNDLE
-    from services.store import file_sha256
     from support.bundles import make_bundle
 
     weights = f"{task.params['settings']['seed']} {task.address.key}"

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from support.imports import imported, module_files
 
+from evaluation.versions import ROOT
 from services.closure import PACKAGES, Tree
 from services.stages.catalogue import STAGES
 from services.stages.stage import module_of
 from services.tasks import StageName
-from services.versions import ROOT
 
 EVERY = frozenset(STAGES)
 
@@ -69,7 +69,7 @@ def versions(root: Path) -> dict[str, str]:
         ("labeller/curves.py", {"label", "train", "export", "evaluate"}),
         ("labeller/hull.py", {"label", "train", "export"}),
         ("trainer/sgd.py", {"train"}),
-        ("services/templates/report.css", {"train", "report"}),
+        ("evaluation/templates/report.css", {"train", "report"}),
         ("services/stages/making/report.py", {"report"}),
         ("services/templates/dashboard/base.html.j2", set()),
         ("renderer/shaders/hidden/hidden.frag", set()),

@@ -8,22 +8,13 @@ from typing import Any
 
 import pytest
 
+from evaluation.choices import check_budget, check_steepness, check_trained_tail, chosen_tail, parse_glass, parse_tail
 from schemas.bundle import TailSpec
+from schemas.flags import given, parse_size
 from schemas.options import Options
 from schemas.problem import ExitCode, Problem
 from schemas.tail import TailName
-from services.flags import given, parse_size
-from services.options import (
-    BuildOptions,
-    asked,
-    check_budget,
-    check_steepness,
-    check_trained_tail,
-    chosen_tail,
-    default_holdout,
-    parse_glass,
-    parse_tail,
-)
+from services.options import BuildOptions, asked, default_holdout
 
 
 @pytest.fixture

@@ -11,15 +11,15 @@ import pytest
 from support.bundles import make_bundle
 from support.shards import CODE, random_dataset
 
+from diaphane.local.datasets import write_dataset
+from evaluation.progress import SilentProgress
 from labeller.dataset import open_dataset
 from labeller.sampling import Sampling
 from schemas.options import Options
 from schemas.problem import Problem
 from schemas.view import View
-from services.local_datasets import write_dataset
 from services.options import BuildOptions
 from services.plan import Plan, PlannedScene
-from services.progress import SilentProgress
 from services.replay import fine_tuning
 from services.stages.label import Shard
 from services.tasks import Source

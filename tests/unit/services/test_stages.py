@@ -10,11 +10,11 @@ from typing import get_args
 import pytest
 from pydantic import ValidationError
 
+from evaluation.versions import ROOT
 from services.stages.catalogue import STAGES
 from services.stages.stage import module_of
 from services.stages.train import TRAIN, TrainParams
 from services.tasks import ROLES, StageName, Task
-from services.versions import ROOT
 
 PARAMS = TrainParams(seed=1, steps=None, network="tiny", patience=3, start=None, replay=None)
 

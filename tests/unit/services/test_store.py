@@ -16,7 +16,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.store import META, STALE_SECONDS, Address, Store, canonical_json, file_sha256, write_durably
+from schemas.canonical import canonical_json, file_sha256
+from services.store import META, STALE_SECONDS, Address, Store, write_durably
 
 ADDRESS = Address("label", "v1", ("a", "b"), {"g": 0.75, "tail": "density"})
 
