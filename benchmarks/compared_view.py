@@ -13,8 +13,8 @@ from renderer.dump import write_dump
 from schemas.fragments import FragmentDump
 from schemas.measurement import Measurement
 from services.service import Service
-from services.stages.allocations import write_allocations
-from services.store import Address
+from stages.allocations import write_allocations
+from stages.store import Address
 
 SIZE = (1430, 960)
 MEAN = 9

@@ -9,10 +9,10 @@ from typing import Any
 
 from diaphane import shown
 from diaphane.local.build import build as run
+from diaphane.local.options import BuildOptions, asked
 from diaphane.local.result import HEADINGS, BuildResult
 from evaluation.progress import make_progress
 from schemas.options import Options
-from services.options import BuildOptions, asked
 
 
 class Built(BuildResult):

@@ -18,6 +18,7 @@ PAGES = (
     "benchmarks/*.md",
     "benchmarks/bundle/model_card.md",
     "evaluation/README.md",
+    "stages/README.md",
     "deploy/README.md",
     "deploy/client/*/README.md",
     "deploy/retrain/README.md",

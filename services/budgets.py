@@ -8,8 +8,8 @@ from evaluation.budget_words import holds_all, remedy, said_complete, said_defau
 from evaluation.progress import Progress
 from labeller.budgets import default_budgets
 from schemas.problem import ExitCode, Problem
-from services.plan import Plan
-from services.records import RenderedView
+from stages.plan import Plan
+from stages.records import RenderedView
 
 
 def decided(plan: Plan, views: Sequence[RenderedView], progress: Progress) -> Plan:

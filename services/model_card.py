@@ -16,7 +16,7 @@ from schemas.bundle import Manifest
 from schemas.flags import written
 from schemas.licence import commercial_use, verdict
 from schemas.measurement import Measurement
-from services.plan import Plan
+from stages.plan import Plan
 
 _WORST_SCENES = 5
 _WORST_CELLS = 8

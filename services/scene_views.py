@@ -17,9 +17,9 @@ from schemas.glass import DEFAULT_GLASS
 from schemas.measurement import Certificate, Measurement
 from services.database import Database
 from services.database.tables import measurements as table
-from services.stages.evaluate import evaluated_from
-from services.store import MissingArtifact, Store
-from services.tasks import FACTS
+from stages.evaluate import evaluated_from
+from stages.store import MissingArtifact, Store
+from stages.tasks import FACTS
 
 _MOST_ROWS = 5_000
 _OWN = "the materials' own opacity"

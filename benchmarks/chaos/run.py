@@ -16,7 +16,7 @@ from benchmarks.chaos.storm import Kill, Storm
 from schemas.canonical import canonical_json
 from schemas.job import JobKind
 from services.settings import Settings
-from services.store import read_meta
+from stages.store import read_meta
 from tests.support.cluster import API, Cluster
 from tests.support.kernels import warm
 from tests.support.postgres import Postgres

@@ -14,8 +14,8 @@ from diaphane.cli.state import DEFAULT_STATE, JsonOption, StateOption
 from evaluation.wording import counted
 
 if TYPE_CHECKING:
+    from diaphane.local.options import BuildOptions
     from diaphane.local.result import BuildResult
-    from services.options import BuildOptions
 
 
 def build(
@@ -51,10 +51,10 @@ def build(
     **given: Any,
 ) -> None:
     """Render, label, train, evaluate, publish and report. Builds are resumable: rerun the command to continue."""
+    from diaphane.local.options import BuildOptions, asked, parse_licences
     from evaluation.progress import make_progress
     from schemas import flags
     from schemas.options import Options
-    from services.options import BuildOptions, asked, parse_licences
 
     options = BuildOptions(
         scenes=tuple(scenes),

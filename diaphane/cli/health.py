@@ -70,7 +70,7 @@ def _look_for_worker(role: str, state: Path, *, patient: bool) -> None:
     from sqlalchemy.exc import DBAPIError, OperationalError
 
     from services.settings import Settings
-    from services.tasks import ROLES
+    from stages.tasks import ROLES
 
     if role not in ROLES:
         raise Problem(f"There is no role '{role}'.", f"Choose among {', '.join(ROLES)}.")

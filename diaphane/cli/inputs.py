@@ -64,12 +64,12 @@ def named_scenes(scenes: Sequence[str], held_out: Sequence[str]) -> list[SceneIn
 
 
 def with_licences(inputs: Sequence[SceneInput], licences: Sequence[str]) -> list[SceneInput]:
-    """The scenes with the licences of `--licence`; see `services.options.parse_licences`.
+    """The scenes with the licences of `--licence`; see `diaphane.local.options.parse_licences`.
 
     Raises:
         Problem: One is of no scene that is named.
     """
-    from services.options import parse_licences
+    from diaphane.local.options import parse_licences
 
     found = parse_licences(licences, [given.reference for given in inputs])
     return [replace(given, licence=found.get(given.reference)) for given in inputs]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from services.api.server import Server
     from services.service import Service
-    from services.tasks import Role
+    from stages.tasks import Role
 
 DEFAULT_HOST, DEFAULT_PORT = "127.0.0.1", 8035
 FIRST_KEY = "first"
@@ -101,7 +101,7 @@ def _roles(text: str | None) -> tuple[Role, ...]:
 def _announce_missing(roles: Sequence[Role]) -> None:
     """Prints what this server leaves to other workers: jobs that need it wait for one."""
     from services.installed import WORK, missing
-    from services.tasks import ROLES
+    from stages.tasks import ROLES
 
     for role in ROLES:
         if role not in roles:

@@ -31,9 +31,9 @@ def stress(
     as_json: JsonOption = False,
 ) -> None:
     """Run every fast path against float64 on extreme inputs; exit status 1 if one is further off than it may be."""
-    from stress import report
-    from stress.findings import Options, Row
-    from stress.suites import rows_of, selected
+    from evaluation.stress import report
+    from evaluation.stress.findings import Options, Row
+    from evaluation.stress.suites import rows_of, selected
 
     if markdown is not None:
         report.check_markdown(markdown)  # minutes before there is anything to write

@@ -84,8 +84,8 @@ def job_spec(fields: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         Problem: It is not one.
     """
+    from diaphane.local.options import asked
     from schemas.job import JobSpec
-    from services.options import asked
 
     spec = asked(JobSpec, fields)
     # What is not said of a promotion is decided by what the key may do.
@@ -100,7 +100,7 @@ def _stand_in(number: int, entry: SceneInput) -> dict[str, Any]:
 
 def _split(inputs: list[SceneInput], scenes: Sequence[dict[str, Any]]) -> list[SceneInput]:
     """A quarter of the scenes is held out, by their names, as `diaphane build` does."""
-    from services.options import default_holdout
+    from diaphane.local.options import default_holdout
 
     # The number tells scenes of one name apart.
     paths = [Path(str(i)) / str(scene["name"]) for i, scene in enumerate(scenes)]

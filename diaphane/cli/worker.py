@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from types import FrameType
 
     from services.engine.runtime import Runtime
-    from services.tasks import Role
+    from stages.tasks import Role
 
 EXIT_SECONDS = 20.0
 
@@ -55,7 +55,7 @@ def parse_roles(text: str) -> tuple[Role, ...]:
     Raises:
         Problem: One is unknown, or there is none.
     """
-    from services.tasks import ROLES
+    from stages.tasks import ROLES
 
     names = [name.strip() for name in text.split(",") if name.strip()]
     unknown = sorted(set(names) - set(ROLES))

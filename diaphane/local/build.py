@@ -9,6 +9,9 @@ from pathlib import Path
 
 from diaphane.local.datasets import write_dataset
 from diaphane.local.inline import InlineRunner
+from diaphane.local.options import BuildOptions
+from diaphane.local.plan import plan_of_build
+from diaphane.local.replay import fine_tuning
 from diaphane.local.result import BuildResult
 from diaphane.local.state import open_local
 from evaluation.progress import Progress
@@ -18,12 +21,9 @@ from schemas.licence import verdict
 from services import pipeline
 from services.installed import require
 from services.measured import Measured
-from services.options import BuildOptions
 from services.pipeline import Built
-from services.plan import plan_of_build
-from services.replay import fine_tuning
-from services.stages.desk import PAGE
-from services.stages.making.report import Evaluation, write
+from stages.desk import PAGE
+from stages.making.report import Evaluation, write
 
 
 def build(options: BuildOptions, progress: Progress) -> BuildResult:

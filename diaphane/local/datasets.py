@@ -13,13 +13,13 @@ import uuid
 from collections.abc import Sequence
 from pathlib import Path
 
+from diaphane.local.replay import Replay
 from labeller.dataset_index import Member, SourceView, write_index
 from labeller.shards import damaged
 from schemas.canonical import file_sha256
-from services.records import LabelledView
-from services.replay import Replay
-from services.stages.desk import SHARD
-from services.store import Store, sync
+from stages.desk import SHARD
+from stages.records import LabelledView
+from stages.store import Store, sync
 
 _SUFFIX = ".safetensors"
 

@@ -10,12 +10,12 @@ from evaluation.progress import Progress, Stage
 from services.measured import Measured
 from services.registry import Registry
 from services.sources import materialise
-from services.stages import bodies
-from services.stages.catalogue import STAGES
-from services.stages.desk import Desk
-from services.stages.train import TRAIN
 from services.storage import Storage
-from services.tasks import FACTS, JsonFacts, StageName, Task
+from stages import bodies
+from stages.catalogue import STAGES
+from stages.desk import Desk
+from stages.tasks import FACTS, JsonFacts, StageName, Task
+from stages.train import TRAIN
 
 
 class InlineRunner:
@@ -38,7 +38,7 @@ class InlineRunner:
         self._desk = Desk(storage.store, lambda source: materialise(source, storage.blobs, storage.store.root / "tmp"))
 
     def map(self, stage: StageName, tasks: Sequence[Task]) -> list[JsonFacts | None]:
-        """See `services.tasks.Runner`; a task that fails ends the build with its error."""
+        """See `services.runner.Runner`; a task that fails ends the build with its error."""
         facts: list[JsonFacts | None] = []
         if stage == "train":
             return [self._train(task) for task in tasks]
@@ -50,7 +50,7 @@ class InlineRunner:
         return facts
 
     def step(self, name: str, body: Callable[[], Any]) -> Any:
-        """See `services.tasks.Runner`."""
+        """See `services.runner.Runner`."""
         return body()
 
     def _train(self, task: Task) -> JsonFacts:
@@ -75,7 +75,7 @@ class _Last:
         self._notes = notes
 
     def __call__(self, fraction: float, note: str) -> None:
-        """See `services.tasks.Report`."""
+        """See `stages.tasks.Report`."""
         self._notes.append(note)
 
 
@@ -89,7 +89,7 @@ class _Fractions:
         self._bar, self._done = bar, 0
 
     def __call__(self, fraction: float, note: str) -> None:
-        """See `services.tasks.Report`."""
+        """See `stages.tasks.Report`."""
         done = int(fraction * _PARTS)
         self._bar.advance(done - self._done, note)
         self._done = done

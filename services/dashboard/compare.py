@@ -25,7 +25,7 @@ from services.dashboard.sides import Place, Side, measured_scenes, place, views,
 from services.kept import Kept
 from services.problems import Refusal
 from services.service import Service
-from services.store import MissingArtifact
+from stages.store import MissingArtifact
 
 router = APIRouter(prefix="/compare", route_class=PageRoute, include_in_schema=False)
 

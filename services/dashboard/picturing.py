@@ -14,7 +14,7 @@ from renderer.reference.flip import flip
 from services.dashboard.pixels import counts_of
 from services.dashboard.sides import Side
 from services.kept import Kept
-from services.store import Store
+from stages.store import Store
 
 
 class Picturing:

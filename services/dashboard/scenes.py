@@ -24,8 +24,8 @@ from services.database import tables
 from services.problems import Refusal
 from services.scene_views import SeenView, Shot, certificates, views
 from services.service import Service
-from services.store import MissingArtifact
 from services.stored_advice import advice_of
+from stages.store import MissingArtifact
 
 router = APIRouter(prefix="/scenes", route_class=PageRoute, include_in_schema=False)
 

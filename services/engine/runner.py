@@ -22,9 +22,9 @@ from services.engine import states, system
 from services.engine.claims import Claims
 from services.engine.states import Abandoned, Claim
 from services.engine.tasks import Tasks
-from services.stages.catalogue import STAGES
-from services.store import MissingArtifact, StoreAway
-from services.tasks import FACTS, JsonFacts, StageName, Task
+from stages.catalogue import STAGES
+from stages.store import MissingArtifact, StoreAway
+from stages.tasks import FACTS, JsonFacts, StageName, Task
 
 if TYPE_CHECKING:
     from services.measured import Measured
@@ -73,7 +73,7 @@ class _NoStage:
 
 
 class DurableRunner:
-    """See `services.tasks.Runner`.
+    """See `services.runner.Runner`.
 
     Args:
         claim: Of the workflow that conducts the job.
@@ -111,7 +111,7 @@ class DurableRunner:
         self._database, self._tasks, self._claims = database, tasks, claims
 
     def map(self, stage: StageName, tasks: Sequence[Task]) -> list[JsonFacts | None]:
-        """See `services.tasks.Runner`."""
+        """See `services.runner.Runner`."""
         if not tasks:
             return []
         told: dict[str, Any] = {"stage": stage, "attempt": self._attempt}
@@ -151,7 +151,7 @@ class DurableRunner:
         raise Problem(f"The stage {stage} failed: {detail}", document.remedy, ExitCode.CHECK_FAILED)
 
     def step(self, name: str, body: Callable[[], Any]) -> Any:
-        """See `services.tasks.Runner`; a problem is remembered as well as a result.
+        """See `services.runner.Runner`; a problem is remembered as well as a result.
 
         An artifact that the step needs and that is gone is made again.
         """

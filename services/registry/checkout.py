@@ -11,7 +11,7 @@ from schemas.canonical import file_sha256
 from schemas.service import FileRef
 from services.registry.records import PUBLICATION, Publication
 from services.storage import Blobs
-from services.store import sync, sync_tree
+from stages.store import sync, sync_tree
 
 
 def check_out(folder: Path, publication: Publication, files: Mapping[str, FileRef], blobs: Blobs) -> Path:

@@ -27,7 +27,7 @@ from schemas.canonical import canonical_json
 from schemas.problem import Problem
 from schemas.service import FileRef
 from services.settings import Settings
-from services.store import sync
+from stages.store import sync
 
 RELEASE_FORMAT = "diaphane-release/1"
 POINTER_FORMAT = "diaphane-pointer/1"

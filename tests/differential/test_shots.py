@@ -17,8 +17,8 @@ from schemas.colour import display8
 from schemas.fragments import FragmentDump
 from schemas.glass import DEFAULT_GLASS
 from schemas.view import View
-from services.stages.evaluate import EvaluateParams
-from services.stages.shots import Session, Shot
+from stages.evaluate import EvaluateParams
+from stages.shots import Session, Shot
 
 
 def test_a_shot_keeps_the_picture_linear_and_displayed_and_its_counts(

@@ -17,8 +17,8 @@ from diaphane.cli import tables
 from diaphane.cli.app import app
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("schemas", "renderer", "labeller", "trainer", "stress", "evaluation", "services", "diaphane")
-FOLDERS = ("", "docs/", "benchmarks/", "evaluation/", "deploy/", "deploy/retrain/", "deploy/client/*/")
+PACKAGES = ("schemas", "renderer", "labeller", "trainer", "evaluation", "stages", "services", "diaphane")
+FOLDERS = ("", "docs/", "benchmarks/", "evaluation/", "stages/", "deploy/", "deploy/retrain/", "deploy/client/*/")
 DOCUMENTS = sorted(path.relative_to(ROOT).as_posix() for folder in FOLDERS for path in ROOT.glob(f"{folder}*.md"))
 
 DISTRIBUTIONS = {

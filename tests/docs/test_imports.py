@@ -9,7 +9,7 @@ from itertools import pairwise
 import pytest
 from support.imports import imported, module_files
 
-from services.closure import PACKAGES
+from stages.closure import PACKAGES
 
 
 def circle(imports: Mapping[str, set[str]]) -> list[str]:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from diaphane.local.build import build
+from diaphane.local.options import BuildOptions
 from diaphane.local.result import BuildResult
 from diaphane.local.state import open_local
 from evaluation import summary
@@ -21,7 +22,6 @@ from schemas.options import Options
 from schemas.problem import Problem
 from schemas.tail import DEFAULT_TAIL
 from services import steps
-from services.options import BuildOptions
 
 TRAIN = ("nested_shells.usda", "torus_knots.usdc")
 HELD_OUT = "voxel_town.usdc"

@@ -18,6 +18,7 @@ from support.measured import example
 
 import services
 from diaphane.cli.app import run
+from diaphane.local.options import BuildOptions
 from diaphane.local.result import BuildResult
 from evaluation.progress import Progress
 from evaluation.versions import diaphane_version
@@ -26,7 +27,6 @@ from schemas.measurement import RegistryResult
 from schemas.options import Options
 from schemas.problem import ExitCode, Problem
 from services.database import open_database
-from services.options import BuildOptions
 from services.registry import open_registry
 from services.settings import Settings
 from services.storage import open_storage

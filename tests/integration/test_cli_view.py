@@ -32,9 +32,9 @@ from renderer.scene import LoadOptions
 from renderer.techniques import Budget, Needs, technique
 from schemas.bench import CellKey
 from schemas.bundle import load_manifest
+from schemas.bundle_files import bundle_files
 from schemas.problem import ExitCode
 from schemas.tail import DEFAULT_TAIL
-from services.registry.names import bundle_files
 
 SIZE = (64, 48)
 

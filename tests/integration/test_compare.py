@@ -435,7 +435,7 @@ def test_what_is_kept_stays_within_its_bound() -> None:
 def test_pages_need_neither_numba_nor_a_renderer() -> None:
     """The API's image has no numba, OpenGL, OpenEXR, FLIP or torch."""
     heavy = "{'numba', 'moderngl', 'OpenEXR', 'flip_evaluator', 'torch', 'pxr', 'onnx'}"
-    modules = "services.api.application, services.dashboard.compare, services.stages.allocations, renderer.dump"
+    modules = "services.api.application, services.dashboard.compare, stages.allocations, renderer.dump"
     code = f"import sys, {modules}; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, "[]\n"), done.stderr

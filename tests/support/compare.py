@@ -20,10 +20,10 @@ from schemas.fragments import FragmentDump
 from schemas.measurement import Measurement
 from schemas.tail import TailName
 from schemas.view import View as Camera
-from services.stages.desk import save_facts
-from services.stages.label import LABEL, LabelParams
-from services.stages.making import label as making
-from services.store import Address
+from stages.desk import save_facts
+from stages.label import LABEL, LabelParams
+from stages.making import label as making
+from stages.store import Address
 from support.api import Api, measurement
 from support.dumps import random_dump
 

@@ -14,7 +14,7 @@ from diaphane.local.datasets import write_dataset
 from labeller.dataset import open_dataset
 from schemas.problem import Problem
 from schemas.view import View
-from services.stages.label import Shard
+from stages.label import Shard
 
 CODE = "a" * 64
 

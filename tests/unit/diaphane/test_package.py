@@ -18,6 +18,7 @@ from support.measured import example
 
 import diaphane
 from diaphane import Advised, Fragments, allocate, building
+from diaphane.local.options import BuildOptions
 from diaphane.local.result import BuildResult
 from evaluation.advice import run
 from evaluation.advice.rules import advise as ruled
@@ -25,7 +26,6 @@ from evaluation.advice.words import sentences
 from schemas.advice import Size
 from schemas.measurement import RegistryResult
 from schemas.problem import ExitCode, Problem
-from services.options import BuildOptions
 
 RGBA = np.array([[200, 40, 40, 128], [40, 200, 40, 128], [40, 40, 200, 128]], np.uint8)
 ARRAYS = {"counts": np.array([[3, 0]]), "rgba": RGBA, "depth": [1.0, 2.0, 3.0]}

@@ -38,8 +38,8 @@ from services.api.description import build_document
 from diaphane.cli import tables
 from diaphane.cli.app import app
 from schemas.flags import given, written
-from services.options import BuildOptions
-from services.plan import plan_of_job
+from diaphane.local.options import BuildOptions
+from stages.plan import plan_of_job
 
 commands = typer.main.get_command(app).commands
 commands = [commands["build"], commands["jobs"].commands["submit"], commands["retrain"]]

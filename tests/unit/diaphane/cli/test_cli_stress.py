@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from diaphane.cli.app import run
+from evaluation.stress import cases, curves, fills
+from evaluation.stress.suites import Listed
 from labeller.curves import Curves
 from schemas.problem import ExitCode
-from stress import cases, curves, fills
-from stress.suites import Listed
 
 
 @pytest.fixture
