@@ -349,7 +349,7 @@ def test_models_are_listed_shown_promoted_and_rolled_back(folder: Path, capsys: 
 
 def test_a_real_interrupt_ends_with_130(tmp_path: Path) -> None:
     code = (
-        "import sys, time, types, services\n"
+        "import sys, time, types, diaphane.local\n"
         "module = types.ModuleType('diaphane.local.build')\n"
         "def build(options, progress):\n"
         "    with progress.stage('render', 9):\n"
