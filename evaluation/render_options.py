@@ -17,7 +17,7 @@ from renderer.antialias import SAMPLES
 from renderer.aovs import CHANNELS, AovName
 from renderer.scene import LoadOptions
 from renderer.techniques import TECHNIQUES, Needs
-from renderer.techniques.kbuffer_deep import Inference
+from renderer.techniques.base import Inference
 from renderer.timecodes import check_pattern, parse_frames
 from schemas.colour import srgb_to_linear
 from schemas.limits import LIMITS

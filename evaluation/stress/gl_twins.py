@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +14,6 @@ from evaluation.stress.findings import Options
 from evaluation.stress.gl_cases import Case, thinned
 from labeller import reference
 from renderer.csr import offsets_of
-from renderer.reference import (
-    adaptive,
-    bevy,
-    depth_peeling,
-    dual_depth_peeling,
-    exact,
-    moment,
-    multilayer,
-    stochastic,
-    storm_rules,
-    wavelet,
-    weighted_average,
-    weighted_blended,
-)
 from renderer.reference.arrivals import arriving
 from renderer.techniques import (
     TECHNIQUES,
@@ -38,15 +25,12 @@ from renderer.techniques import (
     WeightedBlended,
     technique,
 )
-from renderer.techniques.bevy import POOL as BEVY_POOL
-from renderer.techniques.binned import DEFAULT_BINS
-from renderer.techniques.ordered import EnginePool, Ordered, capture_ordered
-from renderer.techniques.storm_rules import POOL as STORM_POOL
+from renderer.techniques.ordered import Ordered, capture_ordered
+from renderer.techniques.weighted_blended import Equation
 from schemas.fragments import FragmentDump
 from schemas.tail import TailName
 
 Floats = NDArray[np.float64]
-Twin = Callable[["Truth"], Floats]
 
 PEELED = ("depth-peeling", "dual-depth-peeling")
 
@@ -81,16 +65,17 @@ class Truth:
     def in_order(
         self,
         twin: Callable[[NDArray[np.int64], NDArray[np.uint32], NDArray[np.float32], NDArray[np.uint8]], Floats],
-        pool: EnginePool | None = None,
+        slots: int | None = None,
     ) -> Floats:
         """float64 [P, 3] of a twin that reads fragments in the order of submission; empty where not compared.
 
         Args:
             twin: Takes offsets int64 [P+1], packed colours uint32 [N], depths float32 [N] and backgrounds uint8 [P, 3],
                 and returns linear RGB float64 [P, 3].
-            pool: Of all pixels, compared or not: what it has no room for is lost.
+            slots: Per pixel, in a pool of all of them, compared or not: what it has no room for is lost; None: all
+                are kept.
         """
-        found = self.ordered if pool is None else arriving(self.ordered, pool.slots * self.dump.pixels)
+        found = self.ordered if slots is None else arriving(self.ordered, slots * self.dump.pixels)
         counts = np.diff(found.offsets)
         compared = self.dump.counts > 0
         kept = np.repeat(compared, counts)
@@ -123,80 +108,50 @@ class Unbounded:
     Attributes:
         name: As in the table, with its parameters.
         technique: Renders.
-        twin: float64 [P, 3], linear RGB.
-        bound: Its key in `evaluation.stress.gl_bounds.BOUNDS`.
     """
 
     name: str
     technique: Technique
-    twin: Twin
-    bound: str
+
+    @property
+    def bound(self) -> str:
+        """Key in `evaluation.stress.gl_bounds.BOUNDS`."""
+        return self.technique.name
 
     @property
     def peeled(self) -> bool:
         """Whether it takes a pass for every layer."""
         return self.bound in PEELED
 
+    def twin(self, truth: Truth) -> Floats:
+        """float64 [P, 3], linear RGB, by the computation that the technique's class names.
+
+        Args:
+            truth: What it reads.
+        """
+        declared, parameters = self.technique.twin, self.technique.parameters(truth.case.frame)
+        if declared.module is None:
+            return truth.hybrid(np.zeros(truth.dump.pixels, int), **parameters)
+        picture = import_module(f"renderer.reference.{declared.module}").picture
+        if declared.takes == "submitted":
+            return truth.in_order(partial(picture, **parameters), declared.slots)
+        made: Floats = picture(truth.dump, **parameters)
+        return made
+
 
 def unbounded(options: Options) -> list[Unbounded]:
     """The exact and the approximate techniques; those with parameters also at the ends of them, but for a quick run."""
-    twins: dict[str, Twin] = {
-        "depth-peeling": lambda truth: depth_peeling.picture(truth.dump),
-        "dual-depth-peeling": lambda truth: dual_depth_peeling.picture(truth.dump),
-        "binned": lambda truth: truth.hybrid(np.zeros(truth.dump.pixels, int), DEFAULT_BINS),
-        "weighted-average": lambda truth: weighted_average.picture(truth.dump),
-        "weighted-blended": lambda truth: _blended(truth, 10),
-        "moment": lambda truth: moment.picture(truth.dump),
-        "multilayer": lambda truth: truth.in_order(multilayer.picture),
-        "adaptive": lambda truth: truth.in_order(adaptive.picture),
-        "stochastic": lambda truth: stochastic.picture(truth.dump),
-        "wavelet": lambda truth: wavelet.picture(truth.dump),
-        "bevy": lambda truth: truth.in_order(bevy.picture, BEVY_POOL),
-        "storm-rules": lambda truth: truth.in_order(storm_rules.picture, STORM_POOL),
-    }
-    found = [
-        Unbounded(name, technique(name), twins.get(name, lambda truth: exact.picture(truth.dump)), name)
-        for name, entry in TECHNIQUES.items()
-        if entry.family != "bounded"
-    ]
+    found = [Unbounded(name, technique(name)) for name, each in TECHNIQUES.items() if each.family != "bounded"]
     return found if options.quick else found + _variants()
 
 
 def _variants() -> list[Unbounded]:
     many, seed = 16, 2**32 - 1
+    equations: tuple[Equation, ...] = (7, 8, 9)
     return [
-        *(
-            Unbounded(
-                f"weighted-blended.{equation}",
-                WeightedBlended(equation),
-                lambda truth, equation=equation: _blended(truth, equation),  # type: ignore[misc]
-                "weighted-blended",
-            )
-            for equation in (7, 8, 9)
-        ),
-        Unbounded("moment.bias 1e-4", Moment(1e-4, 1.0), lambda truth: moment.picture(truth.dump, 1e-4, 1.0), "moment"),
-        Unbounded(
-            f"multilayer.{many} nodes",
-            Multilayer(many),
-            lambda truth: truth.in_order(partial(multilayer.picture, nodes=many)),
-            "multilayer",
-        ),
-        Unbounded(
-            f"adaptive.{many} nodes",
-            Adaptive(many),
-            lambda truth: truth.in_order(partial(adaptive.picture, nodes=many)),
-            "adaptive",
-        ),
-        Unbounded(
-            "stochastic.32 samples",
-            Stochastic(32, seed),
-            lambda truth: stochastic.picture(truth.dump, 32, seed),
-            "stochastic",
-        ),
+        *(Unbounded(f"weighted-blended.{equation}", WeightedBlended(equation)) for equation in equations),
+        Unbounded("moment.bias 1e-4", Moment(1e-4, 1.0)),
+        Unbounded(f"multilayer.{many} nodes", Multilayer(many)),
+        Unbounded(f"adaptive.{many} nodes", Adaptive(many)),
+        Unbounded("stochastic.32 samples", Stochastic(32, seed)),
     ]
-
-
-def _blended(truth: Truth, equation: int) -> Floats:
-    frame = truth.case.frame
-    near, far = frame.view.clip_range(frame.gpu.scene.bounds)
-    return weighted_blended.picture(truth.dump, near, far, equation)
