@@ -358,15 +358,18 @@ def test_a_job_says_what_it_was_asked_for_and_what_came_of_it(tmp_path: Path) ->
     asked = {"kind": "evaluate", "name": None, "model": "glass@1.0.0", "alpha": 0.25, "replay": False}
     evaluate, render = api.job(**asked), api.job(kind="render")
     views = [{"scene": HOSTILE, "view": "front", "fragments": n, "artifact": "x"} for n in (1000, 234)]
-    per_scene = {HOSTILE: {"score": 0.5, "rival": 0.625}}
+    per_scene = {HOSTILE: {"score": 0.5, "rival": 0.625}, "bare": {"score": None}}
+    advice = {"bare": ["Use the S-buffer.", "By memory: <b>."]}
     with api.service.database.write() as connection:
-        for job, result in ((evaluate, {"per_scene": per_scene}), (render, {"views": views})):
+        for job, result in ((evaluate, {"per_scene": per_scene, "advice": advice}), (render, {"views": views})):
             connection.execute(tables.jobs.update().where(tables.jobs.c.id == job).values(result=result))
     visitor = Visitor(api, "read")
     page = visitor.get(f"/jobs/{evaluate}").text
     for said in ("<h1>evaluate glass@1.0.0</h1>", "<dt>Alpha</dt><dd>0.25</dd>", "<dt>Replay</dt><dd>no</dd>"):
         assert said in page
     assert "<dd>0.500 against 0.625 of the champion before</dd>" in page
+    assert "<dt>Advice on bare</dt><dd>Use the S-buffer. By memory: &lt;b&gt;.</dd>" in page
+    assert "Score on bare" not in page
     assert "<dt>Seed</dt>" not in page  # as it is by default
     assert "<script>" not in page
     assert "<dt>Views</dt><dd>2 with 1 234 fragments</dd>" in visitor.get(f"/jobs/{render}").text
