@@ -12,6 +12,7 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.background import BackgroundTask
 
+from evaluation.summary import BUNDLE
 from schemas.glass import DEFAULT_GLASS
 from schemas.limits import LIMITS
 from services.api.etags import is_current
@@ -32,8 +33,7 @@ from services.dashboard.sides import (
 from services.kept import Kept
 from services.problems import Refusal
 from services.service import Service
-from services.store import MissingArtifact
-from services.summary import BUNDLE
+from stages.store import MissingArtifact
 
 router = APIRouter(prefix="/compare", route_class=PageRoute, include_in_schema=False)
 

@@ -9,15 +9,15 @@ from typing import Any
 
 import sqlalchemy as sa
 
+from evaluation import summary
+from evaluation.looks import LOOKS, title
+from evaluation.pictures import EXACT
 from schemas.measurement import Measurement
-from services import summary
 from services.database import Database
 from services.database.tables import measurements as table
 from services.database.tables import scenes
-from services.looks import LOOKS, title
 from services.problems import Refusal
 from services.scene_views import Shot, newest, setting_of
-from services.stages.pictures import EXACT
 
 _MOST_ROWS = 2_000
 _MOST_SCENES = 500

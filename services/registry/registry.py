@@ -19,6 +19,7 @@ from typing import Any
 import sqlalchemy as sa
 
 from schemas.bundle import MANIFEST, Manifest, load_manifest
+from schemas.bundle_files import bundle_files, check_name, digest_of
 from schemas.problem import ExitCode, Problem
 from schemas.service import ModelRecord, MoveRecord, PointerRecord, VersionRecord
 from services.database import Database
@@ -26,7 +27,6 @@ from services.database.tables import aliases, versions
 from services.registry import handovers, pointers
 from services.registry.aliases import history, local_user, lock_name, move, previous
 from services.registry.checkout import check_out
-from services.registry.names import bundle_files, check_name, digest_of
 from services.registry.records import CANDIDATE, CHAMPION, Aliases, Move, Publication
 from services.registry.rows import files_of, publication_of, signed_columns
 from services.registry.signing import Signer

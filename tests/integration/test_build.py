@@ -9,18 +9,19 @@ from pathlib import Path
 
 import pytest
 
+from diaphane.local.build import build
+from diaphane.local.options import BuildOptions
+from diaphane.local.result import BuildResult
+from diaphane.local.state import open_local
+from evaluation import summary
+from evaluation.progress import PlainProgress, SilentProgress
 from labeller.dataset import open_dataset
 from renderer.samples import write_samples
 from schemas.bundle import load_manifest
 from schemas.options import Options
 from schemas.problem import Problem
 from schemas.tail import DEFAULT_TAIL
-from services import steps, summary
-from services.build import build
-from services.local import open_local
-from services.options import BuildOptions
-from services.progress import PlainProgress, SilentProgress
-from services.result import BuildResult
+from services import steps
 
 TRAIN = ("nested_shells.usda", "torus_knots.usdc")
 HELD_OUT = "voxel_town.usdc"

@@ -17,13 +17,13 @@ import pytest
 from support.fake_server import KEY, PART_BYTES, FakeServer, Fault, fake_server
 
 import services
+from diaphane.cli import inputs
+from diaphane.cli.app import run
+from diaphane.client import Client
+from diaphane.client.events import server_sent
+from diaphane.client.packing import pack
+from diaphane.client.transport import Transport
 from schemas.problem import ExitCode, Problem
-from services.cli import inputs
-from services.cli.app import run
-from services.client import Client
-from services.client.events import server_sent
-from services.client.packing import pack
-from services.client.transport import Transport
 
 ROOT = Path(services.__file__).parent.parent
 
@@ -518,7 +518,7 @@ def test_an_interrupt_while_watching_leaves_the_job_alone(server: FakeServer, fo
         return {"state": "succeeded"}
 
     server.outcome = hold
-    command = [sys.executable, "-c", f"from services.cli import main; main(['jobs', 'watch', '{job_id}'])"]
+    command = [sys.executable, "-c", f"from diaphane.cli import main; main(['jobs', 'watch', '{job_id}'])"]
     child = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert waiting.wait(20)
     child.send_signal(signal.SIGINT)

@@ -18,6 +18,8 @@ from support.compare import CAMERA, FACTORS, HOSTILE_VIEW, MODELS, RULES, TAIL, 
 from support.dashboard import Visitor
 from support.postgres import Postgres
 
+from evaluation.pictures import counts_map, read_png, write_png
+from evaluation.report import colours
 from labeller import reference
 from labeller.hull import lower_hulls
 from renderer import metrics
@@ -33,9 +35,7 @@ from services.dashboard.measured import history, of_version
 from services.dashboard.pixels import RULE_TITLES
 from services.database import tables
 from services.kept import Kept
-from services.report import colours
 from services.scene_views import views
-from services.stages.pictures import counts_map, read_png, write_png
 
 
 @pytest.fixture(scope="module")
@@ -450,7 +450,7 @@ def test_what_is_kept_stays_within_its_bound() -> None:
 def test_pages_need_neither_numba_nor_a_renderer() -> None:
     """The API's image has no numba, OpenGL, OpenEXR, FLIP or torch."""
     heavy = "{'numba', 'moderngl', 'OpenEXR', 'flip_evaluator', 'torch', 'pxr', 'onnx'}"
-    modules = "services.api.application, services.dashboard.compare, services.stages.allocations, renderer.dump"
+    modules = "services.api.application, services.dashboard.compare, stages.allocations, renderer.dump"
     code = f"import sys, {modules}; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, "[]\n"), done.stderr
