@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from evaluation import summary
+from evaluation.advice.gathered import of_measurements
 from schemas.bundle import load_manifest, network_digest, write_card
 from schemas.bundle_files import bundle_digest
 from schemas.job import JobSpec
@@ -18,7 +19,6 @@ from schemas.problem import ExitCode, Problem
 from schemas.service import SceneRecord, ShardRef
 from services import budgets, steps
 from services.acceptance import begun_plan
-from services.advice.gathered import of_measurements
 from services.fine_tuning import without_champion
 from services.model_card import command_of, model_card
 from services.registry import Publication
