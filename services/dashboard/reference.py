@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Final
 
 from fastapi import APIRouter, Request, Response
+from markupsafe import Markup
 
 from services.dashboard.page import PageRoute, render
 
@@ -61,7 +63,7 @@ class Reference:
 @router.get("", response_class=Response)
 def show_reference(request: Request) -> Response:
     """The page."""
-    return render(request, "docs", reference=reference(request.app.state.document()))
+    return render(request, "docs", reference=reference(request.app.state.document()), prose=prose)
 
 
 @cache
@@ -79,9 +81,10 @@ def reference(text: str) -> Reference:
                 operation = operations[method]
                 groups.setdefault(operation["tags"][0], []).append(_operation(method, path, operation))
     schemas = document["components"]["schemas"]
+    described = {name: attributes(schema.get("description", "")) for name, schema in schemas.items()}
     return Reference(
         tuple((tag, tuple(found)) for tag, found in sorted(groups.items())),
-        tuple((name, schemas[name].get("description", ""), tuple(_properties(schemas[name]))) for name in schemas),
+        tuple((name, text, tuple(_properties(schemas[name], of))) for name, (text, of) in described.items()),
     )
 
 
@@ -113,10 +116,34 @@ def _schema_of(answer: Mapping[str, Any]) -> str:
     return type_in_words(schema) if schema else ""
 
 
-def _properties(schema: Mapping[str, Any]) -> Iterator[Field]:
+def _properties(schema: Mapping[str, Any], described: Mapping[str, str]) -> Iterator[Field]:
     required = schema.get("required", ())
     for name, one in schema.get("properties", {}).items():
-        yield Field(name, "", name in required, type_in_words(one), one.get("description", ""))
+        yield Field(name, "", name in required, type_in_words(one), one.get("description") or described.get(name, ""))
+
+
+def attributes(description: str) -> tuple[str, dict[str, str]]:
+    """Takes apart what a schema has of a class's docstring.
+
+    Args:
+        description: Text, and after it a section `Attributes:` if the class has one.
+
+    Returns:
+        The text, and attribute -> what it means.
+    """
+    text, _, section = description.partition("\n\nAttributes:\n")
+    found: dict[str, str] = {}
+    for entry in re.split(r"\n {4}(?! )", f"\n{section}")[1:]:
+        name, _, meaning = entry.partition(":")
+        found[name] = " ".join(meaning.split())
+    return text, found
+
+
+def prose(text: str) -> Markup:
+    """A description with what stands between backticks as code."""
+    return Markup("").join(
+        Markup("<code>{}</code>").format(part) if index % 2 else part for index, part in enumerate(text.split("`"))
+    )
 
 
 def type_in_words(schema: Mapping[str, Any]) -> str:

@@ -718,3 +718,10 @@ def test_every_operation_and_schema_of_the_api_has_its_place_on_the_docs_page(em
 )
 def test_a_type_in_words(schema: dict[str, object], words: str) -> None:
     assert reference.type_in_words(schema) == words
+
+
+def test_attributes_of_a_docstring_become_the_meanings_of_properties() -> None:
+    text = "A key.\n\nAttributes:\n    name: For people;\n        any: text.\n    scopes: What it may."
+    assert reference.attributes(text) == ("A key.", {"name": "For people; any: text.", "scopes": "What it may."})
+    assert reference.attributes("A key.") == ("A key.", {})
+    assert reference.prose("a `<b>` <c>") == "a <code>&lt;b&gt;</code> &lt;c&gt;"
