@@ -79,6 +79,16 @@ def test_every_page_is_clean(tab: Tab, shown: Shown, tmp_path: Path) -> None:
     assert _only_status(tab, 404)
 
 
+def test_opened_parts_of_the_docs_page_are_clean(tab: Tab) -> None:
+    tab.page.goto("/docs", wait_until="load")
+    tab.page.locator("#submit_job summary").click()
+    tab.page.locator("#schema-JobSpec summary").click()
+    tab.page.locator("#submit_job pre").wait_for(state="visible")
+    tab.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    assert tab.audit() == []
+    assert tab.faults == []
+
+
 def test_pages_without_anything_to_show_say_what_to_do(empty_tab: Tab) -> None:
     for place in ("/", "/jobs", "/models", "/scenes"):
         empty_tab.page.goto(place, wait_until="load")
