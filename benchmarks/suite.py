@@ -20,7 +20,7 @@ from pathlib import Path
 
 from benchmarks.casting.cases import SHARED as FOLDER
 from benchmarks.comparing.measured import RESULTS, read_lines
-from benchmarks.comparing.page import page, pictures
+from benchmarks.comparing.page import USUAL, page, pictures
 from benchmarks.comparing.scenes import (
     ALPHAS,
     BUNDLE,
@@ -162,6 +162,7 @@ def _options(part: Part, arguments: argparse.Namespace, work: Path) -> BenchOpti
         variants=part.case.variants,
         path=part.path,
         account=part.size == SIZES[0],
+        closer=USUAL,
         repeats=arguments.repeats,
         limit=arguments.limit,
     )

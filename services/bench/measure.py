@@ -66,11 +66,12 @@ class Bench:
         for run in timed:
             times = {"repeats": len(run.recordings), "passes": run.passes(), "gpu": run.gpu(), "frame": run.frame()}
             self._cells[run.key] = self._cells[run.key].model_copy(update=times)
+        closer = [run for run in timed if self.options.is_closer(run.key)]
         if self.options.account:
-            for run in timed:
+            for run in closer:
                 self._cells[run.key] = self._cells[run.key].model_copy(update={"work": run.work(self.subject)})
         if self.options.path:
-            for key, found in measure_flicker(self.subject, timed, self.options.path).items():
+            for key, found in measure_flicker(self.subject, closer, self.options.path).items():
                 update = {"flicker": found.colour, "flicker_k": found.k}
                 self._cells[key] = self._cells[key].model_copy(update=update)
         return list(self._marks.values()), [self._cells[key] for key in keys]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from renderer.techniques import TECHNIQUES, Needs, technique
+from schemas.bench import CellKey
 from schemas.glass import DEFAULT_GLASS, GlassReading
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
@@ -50,6 +51,8 @@ class BenchOptions:
         path: Frames of the camera path that flicker is measured on; 0: none.
         repeats: Timed frames of each cell, after a warm-up.
         account: Whether a frame of each cell is counted (`renderer.account`).
+        closer: The budget, of those above, whose cells alone are counted and followed along the path, beside those
+            without a budget: each costs as much as timing does. None: all.
         device: What bounds of frame times are stated for.
         limit: Seconds that the repeats of one cell may take; what takes longer by itself is timed once.
         resume: Whether cells that were measured into `out` already are kept.
@@ -79,10 +82,15 @@ class BenchOptions:
     path: int = 0
     repeats: int = 3
     account: bool = True
+    closer: float | None = None
     device: Device = field(default_factory=Device)
     limit: float = 10.0
     resume: bool = True
     state: Path = Path(".diaphane")
+
+    def is_closer(self, key: CellKey) -> bool:
+        """Whether a cell is counted and followed along the path."""
+        return self.closer is None or key.budget_factor in (None, self.closer)
 
     def __post_init__(self) -> None:
         for scene in self.scenes:

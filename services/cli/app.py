@@ -156,7 +156,18 @@ def _call(arguments: Sequence[str]) -> int:
         return exit_.exit_code
     except (KeyboardInterrupt, Abort):
         return ExitCode.INTERRUPTED
+    except Exception as error:
+        if _interrupted(error):
+            return ExitCode.INTERRUPTED
+        raise
     return int(status or 0)  # typer itself gives 130 for an interrupt within a command
+
+
+def _interrupted(error: BaseException | None) -> bool:
+    """Whether an interrupt is behind an error: one that arrives within compiled code may leave it as a SystemError."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _disk(error: OSError) -> Problem:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -39,9 +40,8 @@ def subject(gpu: GpuScene) -> Subject:
 
 @pytest.fixture(scope="module")
 def options() -> BenchOptions:
-    return BenchOptions(
-        (), NAMES, Path("unused"), budgets=(1.0, 2.0), tails=("density", "paper"), path=2, repeats=2, account=False
-    )
+    asked = {"budgets": (1.0, 2.0), "tails": ("density", "paper"), "path": 2, "repeats": 2, "account": False}
+    return BenchOptions((), NAMES, Path("unused"), **asked, closer=1.0)  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,8 @@ def test_every_planned_cell_is_measured(
             assert READBACK in cell.passes
             assert cell.frame.least <= cell.frame.median <= cell.frame.most
         moves = key.basis != "memory" and TECHNIQUES[key.technique].family != "exact"
-        assert (cell.flicker is not None) == moves
+        assert (cell.flicker is not None) == (moves and key.budget_factor in (None, 1.0))
+    assert all(replace(options, closer=None).is_closer(key) for key in measured[1])
 
 
 def test_the_exact_picture_is_that_of_the_plain_reference(subject: Subject) -> None:

@@ -86,9 +86,15 @@ OPERATIONS = sum(len(operations) for operations in build_document()["paths"].val
 """All but the one that gives the document itself, which schemathesis reads and leaves out."""
 
 
-def test_the_server_does_what_the_document_says(api: Api, tmp_path: Path, examples: int) -> None:
-    said = _run(api, tmp_path, examples, "--header", f"Authorization:{api.headers()['Authorization']}")
-    assert f"Tested: {OPERATIONS}" in said
+@pytest.mark.parametrize(
+    ("database_url", "phases"),
+    # What coverage asks follows from the document alone and is most of it: once is enough, of the stricter database.
+    [("sqlite", "examples,fuzzing,stateful"), ("postgresql", "examples,coverage,fuzzing,stateful")],
+    indirect=["database_url"],
+)
+def test_the_server_does_what_the_document_says(api: Api, tmp_path: Path, examples: int, phases: str) -> None:
+    key = f"Authorization:{api.headers()['Authorization']}"
+    assert f"Tested: {OPERATIONS}" in _run(api, tmp_path, examples, "--header", key, f"--phases={phases}")
 
 
 @pytest.mark.parametrize("database_url", ["postgresql"], indirect=True)

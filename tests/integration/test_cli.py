@@ -240,6 +240,16 @@ def test_an_interrupt_says_how_to_continue(
     assert f"Continue with: {command}" in capsys.readouterr().err
 
 
+def test_an_interrupt_that_compiled_code_turned_into_another_error_is_one(
+    pipeline: Callable[[Build], list[BuildOptions]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    error = SystemError("<function f> returned a result with an exception set")
+    error.__cause__ = KeyboardInterrupt()
+    pipeline(raising(error))
+    assert run(BUILD) == ExitCode.INTERRUPTED
+    assert capsys.readouterr().err.startswith("error: Stopped.\n")
+
+
 def test_an_unexpected_error_is_short_and_its_traceback_is_kept(
     pipeline: Callable[[Build], list[BuildOptions]], capsys: pytest.CaptureFixture[str], folder: Path
 ) -> None:
