@@ -31,6 +31,14 @@ export class Cores {
     this.#tiles = Math.ceil(width / TILE) * Math.ceil(height / TILE);
   }
 
+  get width(): number {
+    return this.#store.width;
+  }
+
+  get height(): number {
+    return this.#store.height;
+  }
+
   /** [P][BINS], what fragments are added to (add_to_bins.wgsl); after `select`, what is kept (bin_words.wgsl). */
   get words(): GPUBuffer {
     return this.#store.words("bins", this.tail.bins * this.#store.pixels);
