@@ -57,6 +57,7 @@ def _pages(shown: Shown) -> dict[str, str]:
         "model": "/models/glass",
         "scenes": "/scenes",
         "webhooks": "/webhooks",
+        "docs": "/docs",
         "scene": f"/scenes/{shown.scene}",
         "scene-rejected": f"/scenes/{shown.rejected}",
     }
