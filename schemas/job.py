@@ -16,7 +16,8 @@ from schemas.view import ListedView
 
 JobKind = Literal["build", "render", "label", "train", "evaluate"]
 """`render` ends with fragment dumps, `label` with a data set, `train` with a version without a score, `evaluate` with
-measurements of a version; `build` is all of them, and promotes what is better."""
+measurements of the techniques that need no bundle, and of a version if it names one, and with what they advise; `build`
+is all of them, and promotes what is better."""
 
 JobState = Literal["queued", "running", "cancelling", "cancelled", "succeeded", "failed"]
 FINAL_STATES: tuple[JobState, ...] = ("cancelled", "succeeded", "failed")
@@ -79,7 +80,7 @@ class JobSpec(Options):
         name: Bundle that a `build` or `train` publishes a version of.
         scenes: What it is made from; empty where a `train` names a data set.
         dataset: Data set that a `train` learns from, instead of scenes. Its rows were weighted when it was made.
-        model: Version that an `evaluate` measures, `name`, `name@alias` or `name@1.2.0`.
+        model: Version that an `evaluate` measures beside what needs no bundle: `name`, `name@alias` or `name@1.2.0`.
         start_from: Network that the training begins with: `scratch` is none, the weights are drawn by the seed;
             `champion` is that of the job's own name, if there is one yet; else a version, as in `model`. What an alias
             means is decided when the job is submitted: its record names the version.
@@ -94,7 +95,7 @@ class JobSpec(Options):
     name: Annotated[ModelName | None, Option("Name of the bundle in the registry.", absent="none is made")] = None
     scenes: tuple[SceneUse, ...] = Field(default=(), max_length=LIMITS.scenes)
     dataset: Annotated[DatasetId | None, Option("Data set that a train learns from.", absent="its scenes")] = None
-    model: Annotated[ModelReference | None, Option("Version that an evaluate measures.", absent="none")] = None
+    model: Annotated[ModelReference | None, Option("Version that an evaluate measures, too.", absent="none")] = None
     start_from: Annotated[
         ModelReference,
         Option(
@@ -127,8 +128,6 @@ class JobSpec(Options):
             raise ValueError(f"a {self.kind} needs a name")
         if self.kind != "render" and self.tail not in BINNED_TAILS:
             raise ValueError(f"labels are made of depth bins, so the tail is one of {', '.join(BINNED_TAILS)}")
-        if self.kind == "evaluate" and self.model is None:
-            raise ValueError("an evaluate needs a model")
         if self.begins_with is not None and self.kind not in ("build", "train"):
             raise ValueError(f"a {self.kind} trains nothing, so there is nothing to start from")
         if self.weights != DEFAULT_WEIGHTS and self.kind in ("render", "evaluate"):

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from evaluation import summary
+from evaluation.advice.gathered import of_measurements
 from schemas.bundle import load_manifest, network_digest, write_card
 from schemas.bundle_files import bundle_digest
 from schemas.job import JobSpec
@@ -139,7 +140,7 @@ def run_job(spec: JobSpec, scenes: Mapping[str, SceneRecord], runner: Runner, jo
         champion = _champion(plan, runner)
         return {"dataset": dataset, **_publish_unscored(plan, runner, _learn(plan, runner, entries, views, champion))}
     if spec.kind == "evaluate":
-        return {"dataset": dataset, **_evaluate_job(plan, runner, views, str(spec.model))}
+        return {"dataset": dataset, **_evaluate_job(plan, runner, views, spec.model)}
     return {"dataset": dataset, "views": [_view_result(view.rendered) for view in views]}
 
 
@@ -170,18 +171,29 @@ def _build_job(plan: Plan, runner: Runner, job: JobContext) -> dict[str, Any]:
     }
 
 
-def _evaluate_job(plan: Plan, runner: Runner, views: Sequence[LabelledView], model: str) -> dict[str, Any]:
-    meant = runner.step("resolve model", lambda: runner.registry.resolve(model).version)
-    publication = runner.registry.resolve(f"{model.partition('@')[0]}@{meant}")
-    evaluated = steps.evaluate_views(plan, runner, views, source_of_version(runner.registry.record(publication)), None)
-    reference = f"{publication.name}@{publication.version}"
+def _evaluate_job(plan: Plan, runner: Runner, views: Sequence[LabelledView], model: str | None) -> dict[str, Any]:
+    publication = None if model is None else _meant(runner, model)
+    bundle = None if publication is None else source_of_version(runner.registry.record(publication))
+    evaluated = steps.evaluate_views(plan, runner, views, bundle, None)
+    reference = None if publication is None else f"{publication.name}@{publication.version}"
     _record(runner, evaluated, reference)
     measured = [m for view in evaluated for m in view.measurements]
-    per_scene = {
-        label: {"score": summary.score(m for m in measured if m.scene == label)}
-        for label in sorted({m.scene for m in measured})
+    labels = sorted({m.scene for m in measured})
+    advised = {
+        label: of_measurements(label, [(m, reference or "") for m in measured if m.scene == label]) for label in labels
     }
-    return {"reference": reference, "score": summary.score(measured), "per_scene": per_scene}
+    return {
+        "reference": reference,
+        "score": summary.score(measured),
+        "per_scene": {label: {"score": summary.score(m for m in measured if m.scene == label)} for label in labels},
+        "advice": {label: list(advice.text) for label, advice in advised.items() if advice is not None},
+    }
+
+
+def _meant(runner: Runner, model: str) -> Publication:
+    """The version that a reference means when the job first asks."""
+    version = runner.step("resolve model", lambda: runner.registry.resolve(model).version)
+    return runner.registry.resolve(f"{model.partition('@')[0]}@{version}")
 
 
 def _train_on_dataset(plan: Plan, runner: Runner, dataset: str) -> dict[str, Any]:
@@ -356,7 +368,7 @@ def _into_registry(
     return made, known
 
 
-def _record(runner: Runner, evaluated: Sequence[EvaluatedView], reference: str) -> None:
+def _record(runner: Runner, evaluated: Sequence[EvaluatedView], reference: str | None) -> None:
     """Keeps the measurements, so that they can be asked for."""
 
     def body() -> int:

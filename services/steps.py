@@ -103,7 +103,7 @@ def learn(
 
 
 def evaluate_views(
-    plan: Plan, runner: Runner, views: Sequence[LabelledView], bundle: Source, export: Task | None
+    plan: Plan, runner: Runner, views: Sequence[LabelledView], bundle: Source | None, export: Task | None
 ) -> tuple[EvaluatedView, ...]:
     """Render and measure views with the baselines, the oracle and a bundle.
 
@@ -111,20 +111,22 @@ def evaluate_views(
         plan: What was asked for.
         runner: Does it.
         views: Labelled views.
-        bundle: The bundle.
+        bundle: The bundle; None: the others alone.
         export: The task that exported it; None: it is published.
     """
-    baselines = [EVALUATE.ask(plan, view, "baseline") for view in views]
-    bundles = [EVALUATE.ask(plan, view, "bundle", bundle, export) for view in views]
     # Baseline and bundle of a view follow each other: they share the frame's opaque and gather passes.
-    asked = [task for pair in zip(baselines, bundles, strict=True) for task in pair]
-    made = _made(runner, EVALUATE, asked)
+    asked = [
+        [EVALUATE.ask(plan, view, "baseline")]
+        + ([] if bundle is None else [EVALUATE.ask(plan, view, "bundle", bundle, export)])
+        for view in views
+    ]
+    made = iter(_made(runner, EVALUATE, [task for tasks in asked for task in tasks]))
     evaluated = []
-    for index, view in enumerate(views):
-        pair, facts = asked[2 * index : 2 * index + 2], made[2 * index : 2 * index + 2]
+    for view, tasks in zip(views, asked, strict=True):
+        facts = [next(made) for _ in tasks]
         if all(found is not None for found in facts):
             measured = tuple(m for found in facts for m in _measurements(view, found))
-            evaluated.append(EvaluatedView(view, tuple(pair), measured))
+            evaluated.append(EvaluatedView(view, tuple(tasks), measured))
     return tuple(evaluated)
 
 

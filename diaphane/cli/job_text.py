@@ -26,3 +26,5 @@ def show_job(job: dict[str, Any], *, as_json: bool) -> None:
     for name, value in (job.get("result") or {}).items():
         if isinstance(value, str | int | float):
             print(f"{plain(name)}: {plain(value)}")
+    for label, lines in ((job.get("result") or {}).get("advice") or {}).items():
+        print(f"{plain(label)}: {plain(' '.join(lines))}")

@@ -69,5 +69,9 @@ def read_advice(
     frame = None if size is None else parse_frame(size)
     found = stored_advice(service.database, scene.name, scene.digest, frame, parse_memory(memory))
     if found is None:
-        raise Refusal("not-found", "Nothing was measured on this scene yet.", "Submit a job `evaluate` with it.")
+        raise Refusal(
+            "not-found",
+            "Nothing was measured on this scene yet.",
+            "Submit a job `evaluate` with it; it needs no model.",
+        )
     return found

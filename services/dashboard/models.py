@@ -104,6 +104,8 @@ def show_model(
         numbers=[publication.version for publication in published[::-1]][:200],
         paging=paging,
         aliases=aliases,
+        # Whoever asks for no version comes for what waits to be promoted.
+        promoted=chosen.version if version else aliases.get(CANDIDATE, chosen.version),
         aliases_offered=sorted({CHAMPION, CANDIDATE, *aliases}),
         moves=moves[:_MOVES],
         move_count=len(moves),

@@ -41,6 +41,7 @@ PAGES = (
     ("/scenes", "Scenes"),
     ("/compare", "Compare"),
     ("/demo", "Demo"),
+    ("/docs", "API"),
 )
 """What the navigation leads to."""
 

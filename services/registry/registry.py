@@ -34,6 +34,8 @@ from services.settings import Settings
 from services.storage import Blobs
 
 _ALIAS_LENGTH = 40
+_OF_VKB = 1.0
+"""Score of an allocation that is as good as VKB."""
 
 
 class Registry:
@@ -202,7 +204,7 @@ class Registry:
         who: str | None = None,
         promote: bool = True,
     ) -> tuple[bool, str]:
-        """Makes a version the champion if it is the first, or better than the champion on the same views.
+        """Makes a version the champion if it is the first and no worse than VKB, or better than the champion.
 
         Whatever its score, a version is promoted only if torch, ONNX and GLSL agree within the tolerance of its parity
         report. What is not promoted becomes the `candidate`.
@@ -378,6 +380,11 @@ def _compare(score: float | None, champion: Publication | None, rival: float | N
     if score is None or not math.isfinite(score):
         return False, "It has no score: no held-out view could be compared."
     if champion is None:
+        if score > _OF_VKB:
+            return False, (
+                f"Score {score:.4g}: it is the first version with a score, but worse than VKB. More scenes or steps "
+                "may help; `diaphane models promote` makes it the champion by hand."
+            )
         return True, "It is the first version with a score."
     if rival is None or not math.isfinite(rival):
         return False, (

@@ -410,7 +410,10 @@ def test_a_quarter_of_the_scenes_is_held_out_by_itself(server: FakeServer, folde
 @pytest.mark.parametrize(
     ("outcome", "status"),
     [
-        ({"state": "succeeded", "result": {"reference": "glass@1.0.0"}}, ExitCode.OK),
+        (
+            {"state": "succeeded", "result": {"reference": "glass@1.0.0", "advice": {"a": ["Use b.", "Or c."]}}},
+            ExitCode.OK,
+        ),
         (
             {"state": "failed", "problem": {"detail": "No view is left.", "remedy": "Add scenes."}},
             ExitCode.CHECK_FAILED,
@@ -429,6 +432,7 @@ def test_watching_ends_as_the_job_does(
     assert "Rendering. \\u2028Still." in captured.err
     assert captured.err.count("Rendering.") == 1
     assert str(outcome["state"]) in captured.out
+    assert ("a: Use b. Or c.\n" in captured.out) == (status is ExitCode.OK)
     if status is ExitCode.CHECK_FAILED:
         assert "failed: No view is left.\nAdd scenes. Once that is done: diaphane jobs retry job_" in captured.err
     (job_id,) = server.jobs

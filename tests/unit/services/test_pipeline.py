@@ -88,7 +88,15 @@ def test_a_part_of_the_job_ends_where_its_kind_says(kind: str, stages: list[str]
         assert runner.considered == [(None, None, False)], "what was not measured is never promoted"
     if kind == "evaluate":
         assert result["score"] == pytest.approx(1.5)
-        assert set(result["per_scene"]) == {"bottles", "knots", "town"}
+        assert set(result["per_scene"]) == set(result["advice"]) == {"bottles", "knots", "town"}
+
+
+def test_an_evaluation_without_a_model_measures_the_rest_and_advises() -> None:
+    runner = TableRunner()
+    result = run(runner, spec("evaluate"))
+    assert {task.name.split()[-1] for task in runner.of("evaluate")} == {"baseline"}
+    assert (result["reference"], result["score"]) == (None, None)
+    assert all("S-buffer" in " ".join(result["advice"][label]) for label in ("bottles", "knots", "town"))
 
 
 def test_a_view_that_fails_to_the_end_is_left_out_and_the_rest_goes_on() -> None:

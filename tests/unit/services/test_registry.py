@@ -201,6 +201,16 @@ def test_what_is_not_promoted_is_the_candidate(registry: Registry, tmp_path: Pat
     assert registry.aliases("glass").aliases == {"champion": "1.0.0", "candidate": "1.2.0"}
 
 
+@pytest.mark.parametrize(("score", "expected"), [(1.0, CHAMPION), (1.01, CANDIDATE)])
+def test_a_first_version_that_is_worse_than_vkb_is_no_champion(
+    registry: Registry, tmp_path: Path, score: float, expected: str
+) -> None:
+    publication = registry.publish("glass", make_bundle(tmp_path / "bundle"), score, EVALUATION)
+    promoted, reason = registry.consider(publication, score, None)
+    assert registry.aliases("glass").aliases == {expected: "1.0.0"}
+    assert ("worse than VKB" in reason) is not promoted
+
+
 def test_a_better_version_stays_a_candidate_where_that_was_asked(registry: Registry, tmp_path: Path) -> None:
     publication = registry.publish("glass", make_bundle(tmp_path / "bundle"), 0.1, EVALUATION)
     promoted, reason = registry.consider(publication, 0.1, None, promote=False)

@@ -51,6 +51,11 @@ export class Gpu {
     return new Gpu(device, description || [vendor, architecture].filter(Boolean).join(" ") || "unknown adapter");
   }
 
+  /** A device that somebody else opened. */
+  static of(device: GPUDevice): Gpu {
+    return new Gpu(device, "a device that was opened elsewhere");
+  }
+
   /** What sums with weights beyond half floats are blended into. */
   get sumFormat(): "rgba32float" | "rgba16float" {
     return this.blendsFloat32 ? "rgba32float" : "rgba16float";

@@ -77,7 +77,7 @@ export class Renderer {
   async look(work: Work, view: View): Promise<Counted> {
     this.#binned = null;
     await this.frame.draw(work, view, this.#geometry.scene.bounds, CLEAR);
-    const [fragments, occupied, deepest] = await this.#allocation.totals(work);
+    const [fragments, occupied, deepest] = await this.#allocation.totals(work, this.frame.counts);
     if (deepest > TURNS) {
       const [found, most] = [deepest, TURNS].map((each) => each.toLocaleString("en"));
       throw new Trouble(
@@ -127,7 +127,7 @@ export class Renderer {
   }
 
   async #renderExact(work: Work, into: GPUBuffer): Promise<void> {
-    this.#allocation.placeAll(work);
+    this.#allocation.placeAll(work, this.frame.counts);
     await renderExact(this.frame, work, this.#allocation.offsets, this.#counted.fragments, into);
   }
 
@@ -142,7 +142,7 @@ export class Renderer {
     const [frame, allocation] = [this.frame, this.#allocation];
     const binned = await this.#gathered(work, bundle.tail, true);
     allocation.begin(work, binned, budget);
-    predict(frame, work, bundle, binned, allocation);
+    predict(frame, work, bundle, binned, allocation, frame.ranges, frame.background);
     allocation.place(work, binned);
     await renderCore(frame, work, binned, allocation, budget, into);
   }

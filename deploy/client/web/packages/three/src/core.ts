@@ -3,7 +3,6 @@
 
 import {
   type Node,
-  type RenderTarget,
   StorageBufferAttribute,
   type UniformNode,
 } from "three/webgpu";
@@ -12,30 +11,23 @@ import {
   atomicMax,
   atomicStore,
   Break,
-  cameraFar,
-  cameraNear,
   float,
   floatBitsToUint,
   Fn,
   If,
-  int,
   Loop,
   packHalf2x16,
-  positionView,
   screenCoordinate,
-  screenUV,
   storage,
-  texture,
   uint,
   uniform,
   unpackHalf2x16,
   vec2,
   vec3,
   vec4,
-  viewZToOrthographicDepth,
-  viewZToPerspectiveDepth,
 } from "three/tsl";
 import { alpha, colour } from "./surface";
+import type { Visible } from "./visible";
 
 /** Most slots of a pixel. */
 export const MOST = 8;
@@ -43,8 +35,6 @@ export const MOST = 8;
 export const SLOT_BYTES = 12;
 /** Of what 32 bits of depth may differ between passes. */
 const SLACK = 8;
-/** Of a depth of the fixed functions, which is computed otherwise than here. */
-const BIAS = 2 ** -22;
 
 const words = (): StorageBufferAttribute => new StorageBufferAttribute(new Uint32Array(1), 1);
 
@@ -53,28 +43,15 @@ export class Core {
   readonly #width = uniform(1, "uint") as UniformNode<"uint", number>;
   readonly #buffers = [words(), words(), words()].map((each) => storage(each, "uint", 1).toAtomic());
   #count = 1;
-  readonly #isVisible: Node<"bool">;
-  /** 1 for a fragment that the opaque objects do not hide, else 0. */
-  readonly shown: Node<"float">;
 
   /**
    * @param depth Of a fragment.
-   * @param picture Has the depth of the opaque objects. A write to storage is not kept out by a depth test.
+   * @param visible Whether it is seen.
    */
   constructor(
     private readonly depth: Node<"float">,
-    picture: RenderTarget,
-  ) {
-    const behind = texture(picture.depthTexture!, screenUV).level(int(0)).r;
-    this.#isVisible = Fn((builder) => {
-      if (!builder.material.depthTest) return alpha.greaterThan(0);
-      const isFlat = (builder.camera as { isOrthographicCamera?: boolean }).isOrthographicCamera === true;
-      const placed = isFlat ? viewZToOrthographicDepth : viewZToPerspectiveDepth;
-      const here = placed(positionView.z, cameraNear, cameraFar);
-      return alpha.greaterThan(0).and(here.lessThanEqual(behind.add(BIAS)));
-    })().toVar();
-    this.shown = this.#isVisible.select(float(1), float(0)).toVar();
-  }
+    private readonly visible: Visible,
+  ) {}
 
   /** Bytes of the largest buffer for a picture. */
   static bytes(width: number, height: number, k: number): number {
@@ -93,6 +70,11 @@ export class Core {
     }
   }
 
+  /** Gives the slots back; what was compiled stays. */
+  release(): void {
+    this.resize(0, 0, 0);
+  }
+
   /** Inserts a fragment's depth, then says what the pass writes to a target. */
   inserting(output: Node): Node<"vec4"> {
     const [depths] = this.#buffers;
@@ -100,7 +82,7 @@ export class Core {
       const written = vec4(output as Node<"vec4">).toVar();
       const first = this.#first.toVar();
       const carried = this.#key.toVar();
-      If(this.#isVisible, () => {
+      If(this.visible.is, () => {
         this.#each((i) => {
           const before = atomicMax(depths!.element(first.add(i)), carried).toVar();
           carried.assign(before.lessThan(carried).select(before, carried));
@@ -115,12 +97,12 @@ export class Core {
   get remaining(): Node<"float"> {
     const [depths, front, back] = this.#buffers;
     return Fn(() => {
-      const share = this.shown.toVar();
+      const share = this.visible.share.toVar();
       const shaded = colour.max(0).min(65504).toVar();
       const first = this.#first.toVar();
       const nearer = this.#key.add(uint(SLACK)).toVar();
       const place = uint(0).toVar();
-      If(this.#isVisible, () => {
+      If(this.visible.is, () => {
         this.#each((i) => {
           If(atomicLoad(depths!.element(first.add(i))).lessThanEqual(nearer), () => void Break());
           place.addAssign(uint(1));

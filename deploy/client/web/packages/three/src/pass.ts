@@ -1,5 +1,6 @@
 // The pass: opaque objects as three.js draws them, then transparent ones in any order, over them.
 
+import type { Bundle } from "@diaphane/core";
 import {
   type Material,
   type NodeFrame,
@@ -14,11 +15,15 @@ import {
 } from "three/webgpu";
 import type { MRTNode } from "three/webgpu";
 import { isOurs, transmits } from "./surface";
-import { Techniques } from "./techniques";
+import { type Technique, Techniques } from "./techniques";
 
 export interface DiaphaneOptions {
-  /** Slots of every pixel, for fragments that are composited exactly; 0, unless told, is depth bins alone. */
+  /** Slots of a pixel, for fragments that are composited exactly; 0, unless told, is depth bins alone. */
   readonly budget?: number;
+  /** Of `@diaphane/core`; its network shares the budget out between the pixels. */
+  readonly bundle?: Bundle | null;
+  /** `kbuffer-deep` where there is a bundle, else `kbuffer`, unless told. */
+  readonly technique?: Technique;
 }
 
 type View = PerspectiveCamera | OrthographicCamera;
@@ -30,19 +35,23 @@ type Seen = (object: Object3D, material: Material) => boolean;
  */
 export class DiaphanePassNode extends PassNode {
   /**
-   * Slots of every pixel, for fragments that are composited exactly: whole numbers up to 8. It can be changed at any
-   * time.
+   * Slots of a pixel, for fragments that are composited exactly: of every pixel, whole numbers up to 8; of
+   * `kbuffer-deep` on average, any number. This, the technique and the bundle can be changed at any time.
    */
   budget: number;
+  technique: Technique;
+  bundle: Bundle | null;
   readonly #scene: Scene;
   readonly #view: View;
   #techniques: Techniques | null = null;
   #hasWarned = false;
 
   /** @param options As `diaphanePass` takes them. */
-  constructor(scene: Scene, camera: View, { budget = 0 }: DiaphaneOptions = {}) {
+  constructor(scene: Scene, camera: View, { budget = 0, bundle = null, technique }: DiaphaneOptions = {}) {
     super(PassNode.COLOR, scene, camera, { samples: 0 });
     this.budget = budget;
+    this.bundle = bundle;
+    this.technique = technique ?? (bundle ? "kbuffer-deep" : "kbuffer");
     this.#scene = scene;
     this.#view = camera;
   }
@@ -62,20 +71,35 @@ export class DiaphanePassNode extends PassNode {
 
   override updateBefore(frame: NodeFrame): undefined {
     const renderer = frame.renderer as WebGPURenderer;
-    this.#techniques ??= new Techniques(renderer, this.renderTarget);
-    this.#techniques.begin(this.#view);
+    if (this.#techniques?.renderer !== renderer) this.#begun(renderer);
+    const techniques = this.#techniques!;
+    techniques.begin(this.#view);
     let isEmpty = true;
     const before = renderer.getRenderObjectFunction();
     this.#only(renderer, (object, material) => {
       if (!isOurs(material)) return this.#warned(material);
-      this.#techniques?.cover(object, this.#view);
+      techniques.cover(object, this.#view);
       isEmpty = false;
       return false;
     });
     super.updateBefore(frame);
-    if (!isEmpty) this.#composite(renderer, this.#techniques);
+    if (!isEmpty) this.#composite(renderer, techniques);
     renderer.setRenderObjectFunction(before);
     return undefined;
+  }
+
+  /** What `kbuffer-deep` gave the pixels of the last picture, rows from the top; null: it had no part in it. */
+  async slots(): Promise<{ readonly budget: number; readonly k: Uint32Array } | null> {
+    const deep = this.#techniques?.deep;
+    if (!deep?.slots) return null;
+    const offsets = await deep.offsets();
+    return { budget: deep.slots, k: offsets.subarray(1).map((end, p) => end - offsets[p]!) };
+  }
+
+  /** Another renderer follows one whose device was lost: nothing of that can be used. */
+  #begun(renderer: WebGPURenderer): void {
+    this.#techniques?.dispose();
+    this.#techniques = new Techniques(renderer, this.renderTarget);
   }
 
   #composite(renderer: WebGPURenderer, techniques: Techniques): void {
@@ -88,7 +112,7 @@ export class DiaphanePassNode extends PassNode {
     this.#only(renderer, (_, material) => isOurs(material));
     Object.assign(renderer, { opaque: false, transparent: true, autoClear: true, autoClearColor: true });
     renderer.autoClearDepth = renderer.autoClearStencil = false;
-    techniques.render(this.budget, (target: RenderTarget, outputs: MRTNode) => {
+    techniques.render(this, (target: RenderTarget, outputs: MRTNode) => {
       renderer.setRenderTarget(target);
       renderer.setMRT(outputs);
       renderer.render(this.#scene, this.#view);

@@ -33,7 +33,8 @@ type Bounded = Object3D & {
 
 export class Range {
   readonly target: RenderTarget;
-  readonly #tiles: RenderTarget;
+  /** Inverse of the nearest depth, and farthest depth, of every tile. */
+  readonly tiles: RenderTarget;
   readonly #fill: Filter;
   readonly #size = uniform(new Vector2(1, 1));
   readonly #view = uniform(new Vector2(0, 0));
@@ -54,14 +55,14 @@ export class Range {
     const type: TextureDataType = canBlendFloats ? FloatType : HalfFloatType;
     const widen = canBlendFloats ? 1e-6 : 2 ** -10;
     this.target = targetOf([{ name: NAME, format: RGFormat, type }]);
-    this.#tiles = targetOf([{ name: NAME, format: RGFormat, type }]);
+    this.tiles = targetOf([{ name: NAME, format: RGFormat, type }]);
     const z = depth.here;
     const reach = dFdx(z).abs().add(dFdy(z).abs()).div(2).min(z.div(20));
     const [near, far] = [z.sub(reach).max(1e-6), z.add(reach)];
     // Both are kept by maximum, of zeros.
     this.mrt = summed({ [NAME]: vec4(float(1).div(near).mul(1 + widen), far.mul(1 + widen), 0, 0) }, true);
     this.#fill = new Filter(this.#filled());
-    const found = texture(this.#tiles.texture, screenUV).level(int(0)).rg;
+    const found = texture(this.tiles.texture, screenUV).level(int(0)).rg;
     this.here = vec2(float(1).div(found.x.max(1e-9)), found.y).toVar();
   }
 
@@ -82,7 +83,7 @@ export class Range {
   setSize(width: number, height: number): void {
     const [columns, rows] = [Math.ceil(width / TILE), Math.ceil(height / TILE)];
     this.target.setSize(STEPS * columns, STEPS * rows);
-    this.#tiles.setSize(columns, rows);
+    this.tiles.setSize(columns, rows);
     this.#size.value.set(columns, rows);
   }
 
@@ -108,12 +109,12 @@ export class Range {
 
   /** After the geometry: a range for every tile. */
   fill(renderer: WebGPURenderer): void {
-    this.#fill.render(renderer, this.#tiles);
+    this.#fill.render(renderer, this.tiles);
   }
 
   dispose(): void {
     this.target.dispose();
-    this.#tiles.dispose();
+    this.tiles.dispose();
     this.#fill.dispose();
   }
 }

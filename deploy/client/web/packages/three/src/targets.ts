@@ -9,6 +9,7 @@ import {
   NearestFilter,
   NodeMaterial,
   OneFactor,
+  OneMinusSrcAlphaFactor,
   type PixelFormat,
   QuadMesh,
   RenderTarget,
@@ -46,6 +47,9 @@ export function summed(outputs: Readonly<Record<string, Node>>, isMost = false):
   return made;
 }
 
+/** Draws what is transparent into a target. */
+export type Draw = (target: RenderTarget, outputs: MRTNode) => void;
+
 /** A pass over the pixels of a target, without depth. */
 export class Filter {
   /** Its blending is the caller's; none unless told. */
@@ -73,4 +77,11 @@ export class Filter {
   dispose(): void {
     this.material.dispose();
   }
+}
+
+/** Puts a picture, colour times coverage and coverage, over what a target has. */
+export function over(picture: Node): Filter {
+  const made = new Filter(picture);
+  Object.assign(made.material, { blending: CustomBlending, blendSrc: OneFactor, blendDst: OneMinusSrcAlphaFactor });
+  return made;
 }

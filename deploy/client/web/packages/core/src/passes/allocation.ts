@@ -6,7 +6,7 @@ import { BLOCK, CEILING, shader } from "../shaders";
 import type { Tail } from "../tail";
 import type { Work } from "../work";
 import type { Binned } from "./bins";
-import type { Frame } from "./frame";
+import type { Store } from "./store";
 
 /** Members of `Cuts` in cut_state.wgsl. */
 const CUT_WORDS = 4;
@@ -23,57 +23,57 @@ export function budgetOf(factor: number, pixels: number): number {
 }
 
 export class Allocation {
-  readonly #frame: Frame;
+  readonly #store: Store;
   readonly #blocks: number;
   readonly #budget: GPUBuffer;
 
-  constructor(frame: Frame) {
-    this.#frame = frame;
-    this.#blocks = blocksOf(frame.pixels);
-    this.#budget = frame.gpu.filled(new Uint32Array(4), GPUBufferUsage.UNIFORM);
+  constructor(store: Store) {
+    this.#store = store;
+    this.#blocks = blocksOf(store.pixels);
+    this.#budget = store.gpu.filled(new Uint32Array(4), GPUBufferUsage.UNIFORM);
   }
 
   /** Where each pixel's run of slots begins, and the end of the last one. */
   get offsets(): GPUBuffer {
-    return this.#frame.words("offsets", this.#frame.pixels + 1);
+    return this.#store.words("offsets", this.#store.pixels + 1);
   }
 
   /** Bins of each pixel's core. */
   get cuts(): GPUBuffer {
-    return this.#frame.words("cuts", this.#frame.pixels);
+    return this.#store.words("cuts", this.#store.pixels);
   }
 
   /** What a predictor is told of the selection. */
   get state(): GPUBuffer {
-    return this.#frame.words("cut state", CUT_WORDS);
+    return this.#store.words("cut state", CUT_WORDS);
   }
 
   get #sums(): GPUBuffer {
-    return this.#frame.words("sums", 2 * this.#blocks);
+    return this.#store.words("sums", 2 * this.#blocks);
   }
 
-  /** N, pixels with fragments, and fragments of the fullest one, of what was counted; read back. */
-  async totals(work: Work): Promise<readonly [fragments: number, occupied: number, deepest: number]> {
-    const found = this.#frame.words("counted", 3);
-    const blocks = this.#total(work);
+  /** N, pixels with fragments, and fragments of the fullest one, read back. `counts`, [P], are n(p). */
+  async totals(work: Work, counts: GPUBuffer): Promise<readonly [fragments: number, occupied: number, deepest: number]> {
+    const found = this.#store.words("counted", 3);
+    const blocks = this.#total(work, counts);
     this.#run(work, ["join"], "join", [blocks, found], 1);
     work.submit();
-    const [fragments, occupied, deepest] = await this.#frame.gpu.read(found);
+    const [fragments, occupied, deepest] = await this.#store.gpu.read(found);
     return [fragments!, occupied!, deepest!];
   }
 
   /** A slot for every fragment. */
-  placeAll(work: Work): void {
-    this.#total(work);
-    this.#run(work, ["scan"], "scan", [this.#frame.words("total", 1), this.#sums], 1);
-    this.#run(work, ["place_all"], "place_all", [this.#frame.counts, this.#sums, this.offsets], this.#blocks);
+  placeAll(work: Work, counts: GPUBuffer): void {
+    this.#total(work, counts);
+    this.#run(work, ["scan"], "scan", [this.#store.words("total", 1), this.#sums], 1);
+    this.#run(work, ["place_all"], "place_all", [counts, this.#sums, this.offsets], this.#blocks);
   }
 
   /** The same number of slots for every pixel of the window. The work has to be submitted before the next budget. */
   placeFixed(work: Work, budget: number): void {
     this.#setBudget(budget);
-    this.#frame.forPixels(work, ["fixed"], "place_fixed", [this.offsets, this.#budget], {
-      threads: this.#frame.pixels + 1,
+    this.#store.forPixels(work, ["fixed"], "place_fixed", [this.offsets, this.#budget], {
+      threads: this.#store.pixels + 1,
     });
   }
 
@@ -87,7 +87,7 @@ export class Allocation {
 
   /** Selects the rank that uses the budget, and lays out the pool. */
   place(work: Work, { tail, words }: Binned): void {
-    const counted = this.#frame.zeros(work, "prices", RANKS);
+    const counted = this.#store.zeros(work, "prices", RANKS);
     const [state, cuts, sums] = [this.state, this.cuts, this.#sums];
     this.#run(work, [...CUT_FILES, "count_prices"], "count_prices", [words, state, counted], this.#blocks, tail);
     this.#run(work, ["cut_state", "choose"], "choose", [state, counted, this.#budget], 1, tail);
@@ -97,13 +97,17 @@ export class Allocation {
     this.#run(work, [...CUT_FILES, "place_cuts"], "place_cuts", placed, this.#blocks, tail);
   }
 
-  #setBudget(budget: number): void {
-    this.#frame.gpu.device.queue.writeBuffer(this.#budget, 0, new Uint32Array([Math.min(budget, CEILING - 1)]));
+  destroy(): void {
+    this.#budget.destroy();
   }
 
-  #total(work: Work): GPUBuffer {
-    const blocks = this.#frame.words("totals", 4 * this.#blocks);
-    this.#run(work, ["totals"], "total_blocks", [this.#frame.counts, blocks, this.#sums], this.#blocks);
+  #setBudget(budget: number): void {
+    this.#store.gpu.device.queue.writeBuffer(this.#budget, 0, new Uint32Array([Math.min(budget, CEILING - 1)]));
+  }
+
+  #total(work: Work, counts: GPUBuffer): GPUBuffer {
+    const blocks = this.#store.words("totals", 4 * this.#blocks);
+    this.#run(work, ["totals"], "total_blocks", [counts, blocks, this.#sums], this.#blocks);
     return blocks;
   }
 
@@ -115,6 +119,6 @@ export class Allocation {
     groups: number,
     tail?: Tail,
   ): void {
-    this.#frame.dispatch(work, shader(files, tail), entryPoint, buffers, [groups, 1]);
+    this.#store.dispatch(work, shader(files, tail), entryPoint, buffers, [groups, 1]);
   }
 }

@@ -5,13 +5,14 @@ import type { Tail } from "../tail";
 import type { Work } from "../work";
 import type { Frame } from "./frame";
 import type { Pass } from "./geometry";
+import type { Store } from "./store";
 
-const FILES = ["bins", "bin_words", "gather_bins"];
+const FILES = ["bins", "bin_words", "add_to_bins", "gather_bins"];
 const TAIL_ONLY: Pass = { files: FILES, entryPoint: "gather_tail", writes: [false, true] };
 const ALL: Pass = { files: FILES, entryPoint: "gather_all", writes: [false, true, true] };
 
 /** Files of the shaders that weigh fragments of a tail. Their first storage bindings are `tailBuffers`. */
-export const TAIL_FILES = ["bins", "tail_inputs", "kept_bins", "tail"];
+export const TAIL_FILES = ["bins", "tail_inputs", "kept_bins", "in_front", "tail"];
 
 export interface Binned {
   readonly tail: Tail;
@@ -37,6 +38,11 @@ export async function gatherBins(frame: Frame, work: Work, tail: Tail, all: bool
   const luma = all ? frame.zeros(work, "luma", frame.pixels) : null;
   const buffers = [frame.ranges, words, ...(luma ? [luma] : [])];
   await frame.geometry.drawTransparent(work, { ...(all ? ALL : TAIL_ONLY), tail }, frame.depth, buffers);
-  frame.forPixels(work, ["bin_words", "pack"], "pack_bins", [words], { tail });
+  packBins(frame, work, tail, words);
   return { tail, words, luma };
+}
+
+/** Puts what is kept of gathered bins, and the fragments of each, in their place. */
+export function packBins(store: Store, work: Work, tail: Tail, words: GPUBuffer): void {
+  store.forPixels(work, ["bin_words", "pack"], "pack_bins", [words], { tail });
 }

@@ -33,7 +33,7 @@ export async function renderCore(
   const targets = tailTargets(frame);
   const buffers = [...tailBuffers(frame, binned), offsets, cuts, cursors, pool];
   await frame.geometry.drawTransparent(work, { ...CAPTURE, tail: binned.tail }, frame.depth, buffers, targets);
-  frame.forPixels(work, ["sort"], "sort_runs", [offsets, cursors, pool]);
+  frame.forPixels(work, ["slot", "sort"], "sort_runs", [offsets, cursors, pool]);
   const textures = [frame.background, ...targets].map((texture) => texture.createView());
   frame.forPixels(work, ["display", "resolve_core"], "resolve_core", [offsets, cursors, pool, ...textures, shown]);
 }

@@ -24,7 +24,7 @@ export async function renderExact(
   const cursors = frame.zeros(work, "cursors", frame.pixels);
   const pool = frame.room("pool", FRAGMENT_WORDS * Math.max(fragments, 1)); // a binding holds one at least
   await frame.geometry.drawTransparent(work, CAPTURE, frame.depth, [offsets, cursors, pool]);
-  frame.forPixels(work, ["sort"], "sort_runs", [offsets, cursors, pool]);
+  frame.forPixels(work, ["slot", "sort"], "sort_runs", [offsets, cursors, pool]);
   const read = [offsets, pool, frame.background.createView(), shown];
   frame.forPixels(work, ["display", "resolve_exact"], "resolve_exact", read);
 }

@@ -2,12 +2,12 @@
 
 import { type Bounds, type View, cameraBlock } from "../camera";
 import { CONSTANTS } from "../generated";
-import { type Gpu, type Resource, groupsFor } from "../gpu";
+import type { Gpu } from "../gpu";
 import { encodeGamma2 } from "../scene";
 import { shader } from "../shaders";
-import { DEFAULT_TAIL } from "../tail";
 import type { Work } from "../work";
 import { BACKGROUND, DEPTH, type Geometry, type Pass } from "./geometry";
+import { Store } from "./store";
 
 /** Side of the tiles, and pixels across one that its range is found from. */
 const TILE = Number(CONSTANTS["RANGE_TILE"]);
@@ -24,8 +24,7 @@ const TEXEL_BYTES: Partial<Record<GPUTextureFormat, number>> = {
 const RANGE: Pass = { files: ["range"], entryPoint: "find_range", writes: [true] };
 const COUNT: Pass = { files: ["count"], entryPoint: "count_fragments", writes: [true] };
 
-export class Frame {
-  readonly pixels: number;
+export class Frame extends Store {
   readonly background: GPUTexture;
   readonly depth: GPUTexture;
   /** [P], transparent fragments of every pixel. */
@@ -34,16 +33,15 @@ export class Frame {
   readonly ranges: GPUBuffer;
   readonly #grid: readonly [columns: number, rows: number];
   readonly #gridBlock: GPUBuffer;
-  readonly #buffers = new Map<string, GPUBuffer>();
   readonly #targets = new Map<string, GPUTexture>();
 
   constructor(
-    readonly gpu: Gpu,
+    gpu: Gpu,
     readonly geometry: Geometry,
-    readonly width: number,
-    readonly height: number,
+    width: number,
+    height: number,
   ) {
-    this.pixels = width * height;
+    super(gpu, width, height);
     this.background = this.target("background", BACKGROUND);
     this.depth = this.target("depth", DEPTH);
     this.counts = this.words("n", this.pixels);
@@ -52,39 +50,14 @@ export class Frame {
     this.ranges = this.words("ranges", 2 * this.#grid[0] * this.#grid[1]);
   }
 
-  /** Bytes of all buffers and textures that there are by now. */
-  get bytes(): number {
-    const buffers = [...this.#buffers.values()].reduce((sum, { size }) => sum + size, 0);
+  override get bytes(): number {
     const targets = [...this.#targets.values()];
-    return targets.reduce((sum, { format, width, height }) => sum + TEXEL_BYTES[format]! * width * height, buffers);
+    return targets.reduce((sum, { format, width, height }) => sum + TEXEL_BYTES[format]! * width * height, super.bytes);
   }
 
-  /** Gives back all buffers and textures. */
-  destroy(): void {
-    for (const each of [...this.#buffers.values(), ...this.#targets.values()]) each.destroy();
-  }
-
-  /** A storage buffer of words that is kept under a name; its content is what was left in it. */
-  words(name: string, count: number): GPUBuffer {
-    const before = this.#buffers.get(name);
-    if (before && before.size === 4 * Math.max(count, 1)) return before;
-    before?.destroy();
-    this.#buffers.delete(name); // the new one may be more than the device allows
-    const made = this.gpu.words(count);
-    this.#buffers.set(name, made);
-    return made;
-  }
-
-  /** The same, perhaps with room for more; its first words are zero when the work is done. */
-  zeros(work: Work, name: string, count: number): GPUBuffer {
-    const buffer = this.room(name, count);
-    work.encoder.clearBuffer(buffer, 0, 4 * count);
-    return buffer;
-  }
-
-  /** A storage buffer with room for words: it grows, and stays where fewer are needed. */
-  room(name: string, count: number): GPUBuffer {
-    return this.words(name, Math.max(count, (this.#buffers.get(name)?.size ?? 0) / 4));
+  override destroy(): void {
+    super.destroy();
+    for (const each of this.#targets.values()) each.destroy();
   }
 
   /** A texture, of the frame's size if none is given, that is kept under a name and its format. */
@@ -97,33 +70,6 @@ export class Frame {
       this.#targets.set(key, texture);
     }
     return texture;
-  }
-
-  /** Runs a compute shader for every pixel, 64 a group. */
-  forPixels(
-    work: Work,
-    files: readonly string[],
-    entryPoint: string,
-    resources: readonly Resource[],
-    { tail = DEFAULT_TAIL, before = "", threads = this.pixels } = {},
-  ): void {
-    this.dispatch(work, shader(["pixels", ...files], tail, before), entryPoint, resources, groupsFor(threads));
-  }
-
-  /** Runs a compute shader. */
-  dispatch(
-    work: Work,
-    code: string,
-    entryPoint: string,
-    resources: readonly Resource[],
-    groups: readonly [number, number],
-  ): void {
-    const pipeline = this.gpu.compute(code, entryPoint);
-    const pass = work.encoder.beginComputePass();
-    pass.setPipeline(pipeline);
-    pass.setBindGroup(0, this.gpu.bind(pipeline, resources));
-    pass.dispatchWorkgroups(...groups);
-    pass.end();
   }
 
   /**

@@ -7,15 +7,29 @@ import { Trouble } from "../trouble";
 import type { Work } from "../work";
 import type { Allocation } from "./allocation";
 import type { Binned } from "./bins";
-import type { Frame } from "./frame";
+import type { Store } from "./store";
 
 const FILES = ["cut_state", "bin_words", "cuts_of_counts", "bins", "kept_bins", "prices"];
 
-/** Predicts the ranks of every occupied pixel's bins, into its words. What was gathered has sums of luma. */
-export function predict(frame: Frame, work: Work, bundle: Bundle, binned: Binned, into: Allocation): void {
-  const read = [binned.words, into.state, frame.ranges, binned.luma!, frame.background.createView()];
+/**
+ * Predicts the ranks of every occupied pixel's bins, into its words.
+ *
+ * @param binned What was gathered, with sums of luma.
+ * @param ranges [T], nearest depth and extent of every tile.
+ * @param background Of every pixel, gamma-2 encoded.
+ */
+export function predict(
+  store: Store,
+  work: Work,
+  bundle: Bundle,
+  binned: Binned,
+  into: Allocation,
+  ranges: GPUBuffer,
+  background: GPUTexture,
+): void {
+  const read = [binned.words, into.state, ranges, binned.luma!, background.createView()];
   const options = { tail: bundle.tail, before: bundle.wgsl };
-  frame.forPixels(work, FILES, "predict_ranks", read, options);
+  store.forPixels(work, FILES, "predict_ranks", read, options);
 }
 
 /**

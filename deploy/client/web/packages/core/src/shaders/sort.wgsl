@@ -1,14 +1,10 @@
-// Sorts each pixel's run by depth, then packed colour: heapsort, in place.
+// Sorts each pixel's run by depth, then colour: heapsort, in place. `Slot` is declared before.
 @group(0) @binding(0) var<storage, read> offsets: array<u32>;        // [P + 1]
 @group(0) @binding(1) var<storage, read> cursors: array<u32>;        // [P], fragments captured
-@group(0) @binding(2) var<storage, read_write> pool: array<vec2u>;   // packed colour, depth bits
-
-fn comes_before(one: vec2u, two: vec2u) -> bool {
-    return one.y < two.y || (one.y == two.y && one.x < two.x);
-}
+@group(0) @binding(2) var<storage, read_write> pool: array<Slot>;
 
 // Puts a fragment into the heap of `count` fragments from `base` on whose place `hole` is free.
-fn sift(base: u32, count: u32, hole: u32, fragment: vec2u) {
+fn sift(base: u32, count: u32, hole: u32, fragment: Slot) {
     var place = hole;
     loop {
         var child = 2u * place + 1u;

@@ -1,7 +1,8 @@
 // What tests call: `three.compare(...)` and its like.
 
 import { DataUtils, RenderPipeline, WebGPURenderer } from "three/webgpu";
-import { diaphanePass } from "../../src/index";
+import { type Bundle, tailOf } from "@diaphane/core";
+import { type DiaphaneOptions, diaphanePass } from "../../src/index";
 import { peel, type Reference } from "./reference";
 import { SCENES, type Sample } from "./scenes";
 
@@ -28,16 +29,28 @@ interface Agreement {
   readonly most: number;
 }
 
-async function linear(renderer: WebGPURenderer, sample: Sample, budget: number): Promise<Float64Array> {
-  const pass = diaphanePass(sample.scene, sample.camera, { budget });
+/** A bundle of which only its network is known. */
+function bundleOf(tail: string, wgsl: string): Bundle {
+  const selfTest = { features: [], outputs: [], output_scale: [], tolerance: {} };
+  return { name: "tested", version: "1.0.0", tail: tailOf(tail)!, wgsl, selfTest, isSigned: true };
+}
+
+async function linear(renderer: WebGPURenderer, sample: Sample, options: DiaphaneOptions): Promise<Float64Array> {
+  return (await drawnBy(renderer, sample, options)).picture;
+}
+
+/** The picture, rows from the top, and what `kbuffer-deep` gave its pixels. */
+async function drawnBy(renderer: WebGPURenderer, sample: Sample, options: DiaphaneOptions) {
+  const pass = diaphanePass(sample.scene, sample.camera, options);
   const pipeline = new RenderPipeline(renderer, pass);
   pipeline.render();
   const halves = await renderer.readRenderTargetPixelsAsync(pass.renderTarget, 0, 0, WIDTH, HEIGHT);
   const made = new Float64Array(3 * WIDTH * HEIGHT);
   for (let i = 0; i < made.length; i++) made[i] = DataUtils.fromHalfFloat(halves[Math.floor(i / 3) * 4 + (i % 3)]!);
+  const slots = await pass.slots();
   pass.dispose();
   pipeline.dispose();
-  return made;
+  return { picture: made, budget: slots?.budget ?? 0, used: slots?.k.reduce((sum, k) => sum + k, 0) ?? 0 };
 }
 
 /** What the renderer holds after a pass was used, resized and given another budget, and disposed of; before, too. */
@@ -47,7 +60,7 @@ async function life(renderer: WebGPURenderer): Promise<readonly (readonly number
     const { textures, renderTargets, storageAttributes } = renderer.info.memory as unknown as Record<string, number>;
     return [textures!, renderTargets!, storageAttributes!];
   };
-  await linear(renderer, sample, 0);
+  await linear(renderer, sample, {});
   const before = held();
   const pass = diaphanePass(sample.scene, sample.camera, { budget: 2 });
   const pipeline = new RenderPipeline(renderer, pass);
@@ -97,6 +110,6 @@ function drawn(picture: Float64Array, title: string): void {
   document.body.append(canvas);
 }
 
-const three = { start, SCENES, life, reversed, linear, peel: (r: WebGPURenderer, s: Sample): Promise<Reference> => peel(r, s, WIDTH, HEIGHT), agreement, drawn };
+const three = { start, SCENES, life, reversed, linear, drawnBy, bundleOf, peel: (r: WebGPURenderer, s: Sample): Promise<Reference> => peel(r, s, WIDTH, HEIGHT), agreement, drawn };
 Object.assign(globalThis, { three });
 export type Three = typeof three;
