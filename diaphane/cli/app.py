@@ -166,7 +166,7 @@ def _call(arguments: Sequence[str]) -> int:
 def _interrupted(error: BaseException | None) -> bool:
     """Whether an interrupt is behind an error: one that arrives within compiled code may leave it as a SystemError."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
-        error = error.__cause__ or error.__context__
+        error = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
     return error is not None
 
 
