@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from evaluation.pictures import counts_map, stem, write_png
 from labeller.allocation import RULES, Allocation
 from renderer.dump import write_dump
 from schemas.fragments import FragmentDump
 from schemas.measurement import Measurement
 from services.service import Service
-from services.stages.allocations import write_allocations
-from services.stages.pictures import counts_map, stem, write_png
-from services.store import Address
+from stages.allocations import write_allocations
+from stages.store import Address
 
 SIZE = (1430, 960)
 MEAN = 9

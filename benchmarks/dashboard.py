@@ -30,7 +30,7 @@ from schemas.job import JobSpec
 from services.database import tables
 from services.service import Service, open_service
 from services.settings import Settings
-from services.tasks import Task
+from stages.tasks import Task
 from tests.support.bundles import make_bundle
 
 MODELS, JOBS, MEASUREMENTS = 200, 1000, 10_000

@@ -30,7 +30,7 @@ from benchmarks.outputs import add_outputs, write_figures
 from labeller.columns import COLUMNS
 from labeller.dataset import Dataset, open_dataset
 from labeller.shard_file import BLOCK_ROWS, Columns, open_columns, write_columns
-from services.store import sync
+from stages.store import sync
 from trainer.dataset import load_shards
 
 RANGE = 2000

@@ -23,13 +23,13 @@ from benchmarks.load.service import Service
 from benchmarks.load.startup import ROLES
 from benchmarks.markdown import table
 from benchmarks.outputs import add_outputs, write_figures, write_page
+from diaphane.cli.inputs import bring
+from diaphane.cli.watching import ensure_success
+from diaphane.client import Client
+from evaluation.summary import geometric_mean
 from renderer.samples import SAMPLES
-from services.cli.inputs import bring
-from services.cli.watching import ensure_success
-from services.client import Client
 from services.service import open_service
 from services.settings import Settings
-from services.summary import geometric_mean
 
 OLD, NEW = ("bottles", "nested_shells"), "foliage"
 """The project's own scenes that are learned first, and the one that is learned then: glass, and leaves."""
@@ -44,7 +44,7 @@ JSON = dict[str, Any]
 
 
 class Server(Protocol):
-    """What is needed of `services.client.jobs.Jobs`."""
+    """What is needed of `diaphane.client.jobs.Jobs`."""
 
     def submit(self, spec: Mapping[str, Any]) -> tuple[JSON, bool]:
         """Submits a job."""

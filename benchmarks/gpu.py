@@ -31,17 +31,17 @@ from benchmarks.graphics.measuring import Measuring, said
 from benchmarks.graphics.plan import BUDGETS, PLAN, SIZE, Planned, planned
 from benchmarks.outputs import write_figures
 from benchmarks.suite import label
+from evaluation.bench.cells import bundle_of
+from evaluation.bench.groups import said_alpha
+from evaluation.bench.options import parse_budgets, parse_sizes
+from evaluation.bench.subject import Subject
+from evaluation.stress.gl_drivers import GPU
 from renderer.context import describe, gl_context
 from renderer.techniques import Needs
 from renderer.timing import timers_are_right
 from schemas.bench import BenchCell
 from schemas.problem import ExitCode, Problem
 from schemas.work import Device
-from services.bench.cells import bundle_of
-from services.bench.groups import said_alpha
-from services.bench.options import parse_budgets, parse_sizes
-from services.bench.subject import Subject
-from stress.gl_drivers import GPU
 
 MODULE = "benchmarks.gpu"
 MINUTES = 9.0

@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from services.versions import commit, library_versions, machine
+from evaluation.versions import commit, library_versions, machine
 
 
 def head(module: str, arguments: Sequence[str] | None = None) -> dict[str, Any]:

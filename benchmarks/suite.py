@@ -33,18 +33,18 @@ from benchmarks.comparing.scenes import (
     parts_of,
     selected,
 )
+from evaluation.bench.cells import bundle_of
+from evaluation.bench.files import write_files
+from evaluation.bench.groups import said_alpha
+from evaluation.bench.kept import ROWS, Kept
+from evaluation.bench.options import BenchOptions, parse_alphas, parse_sizes
+from evaluation.bench.run import bench, result_of
+from evaluation.progress import Progress, make_progress
+from evaluation.versions import machine
+from evaluation.writing import replacing
 from renderer.context import describe, gl_context
 from renderer.techniques import TECHNIQUES as technique_entries
 from schemas.bench import BenchResult, BenchView
-from services.bench.cells import bundle_of
-from services.bench.files import write_files
-from services.bench.groups import said_alpha
-from services.bench.kept import ROWS, Kept
-from services.bench.options import BenchOptions, parse_alphas, parse_sizes
-from services.bench.run import bench, result_of
-from services.progress import Progress, make_progress
-from services.versions import machine
-from services.writing import replacing
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "benchmarks" / "BENCH.md"
@@ -78,7 +78,7 @@ def main() -> int:
         parts = list(parts_of(cases, arguments.alphas, arguments.sizes))
         for number, part in enumerate(parts):
             start = time.perf_counter()
-            left_out += bench(_options(part, arguments, work), COMMAND, progress).left_out
+            left_out += bench(_options(part, arguments, work), arguments.bundle, COMMAND, progress).left_out
             _tell(progress, part, number, len(parts), time.perf_counter() - start)
     bundle = bundle_of(arguments.bundle).label
     result = result_of(Kept(work, resume=True), COMMAND, bundle, [plain_path(line) for line in left_out])

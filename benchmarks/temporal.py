@@ -26,17 +26,17 @@ from benchmarks.casting.cases import SHARED
 from benchmarks.comparing import scenes as suite
 from benchmarks.markdown import table
 from benchmarks.outputs import add_outputs, write_figures, write_page
+from evaluation.bench.flicker import camera_path, error_change, k_change
+from evaluation.bench.measure import over
+from evaluation.bench.rounds import shoot
+from evaluation.bench.subject import Subject
+from evaluation.local_scenes import LocalScene
 from renderer.scene import LoadOptions
 from renderer.techniques import Budget, Needs, Technique, technique
 from renderer.timing import shared_clock
 from schemas.bundle import load_manifest
 from schemas.colour import display8
 from schemas.view import View
-from services.bench.flicker import camera_path, error_change, k_change
-from services.bench.measure import over
-from services.bench.rounds import shoot
-from services.bench.subject import Subject
-from services.local_scenes import LocalScene
 
 SCENES = (*suite.SHARED, "bottles", "foliage", "curtains", "hair_cards")
 SIZE = (320, 214)

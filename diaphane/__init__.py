@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, Final
 if TYPE_CHECKING:
     from diaphane.advice import Advised, advise
     from diaphane.building import Built, build
+    from diaphane.client import Client
     from diaphane.fragments import Allocations, Fragments, allocate
     from diaphane.picture import Picture
     from diaphane.scene import Scene, open
     from schemas.problem import Problem
-    from services.client import Client
 
 __all__ = [
     "Advised",
@@ -34,7 +34,7 @@ _HOMES: Final = {
     "Advised": "diaphane.advice",
     "Allocations": "diaphane.fragments",
     "Built": "diaphane.building",
-    "Client": "services.client",
+    "Client": "diaphane.client",
     "Fragments": "diaphane.fragments",
     "Picture": "diaphane.picture",
     "Problem": "schemas.problem",

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from diaphane import shown
+from diaphane.bundles import bundle_folder
 from diaphane.scene import Scene
+from evaluation.advice import run, words
+from evaluation.advice.amounts import DEFAULT_MEMORY, DEFAULT_SIZE, parse_frame, parse_memory
+from evaluation.advice.options import AdviceOptions
+from evaluation.advice.page import page
+from evaluation.writing import replacing
 from renderer.scene import LoadOptions
-from services import shown
-from services.advice import run, words
-from services.advice.amounts import DEFAULT_MEMORY, DEFAULT_SIZE, parse_frame, parse_memory
-from services.advice.options import AdviceOptions
-from services.advice.page import page
-from services.writing import replacing
 
 
 class Advised(run.Advised):
@@ -65,7 +66,7 @@ def advise(
         views=None if views is None else Path(views),
         load=scene.load if isinstance(scene, Scene) else LoadOptions(),
         bundle=None if bundle is None else str(bundle),
-        state=Path(state),
     )
-    (found,) = run.advised(options)
+    with bundle_folder(options.used_bundle, Path(state)) as folder:
+        (found,) = run.advised(options, folder)
     return Advised(found.file, found.advice, found.sheet)

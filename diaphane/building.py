@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from diaphane import shown
+from diaphane.local.build import build as run
+from diaphane.local.options import BuildOptions, asked
+from diaphane.local.result import HEADINGS, BuildResult
+from evaluation.progress import make_progress
 from schemas.options import Options
-from services import shown
-from services.build import build as run
-from services.options import BuildOptions, asked
-from services.progress import make_progress
-from services.result import HEADINGS, BuildResult
 
 
 class Built(BuildResult):

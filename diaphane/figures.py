@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from services.report import colours
+from evaluation.report import colours
 
 
 def png(pixels: NDArray[np.uint8]) -> bytes:

@@ -10,13 +10,12 @@ from typing import Concatenate, ParamSpec, Self
 from numpy.typing import ArrayLike
 
 import labeller
-from diaphane import figures
+from diaphane import figures, shown
+from evaluation.summary import number
+from evaluation.wording import counted
 from labeller.allocation import Allocation
 from labeller.api import fragments_of
 from schemas.fragments import FragmentDump
-from services import shown
-from services.summary import number
-from services.wording import counted
 
 P = ParamSpec("P")
 

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diaphane import figures
+from diaphane.cli.lines import size
+from evaluation.looks import title
+from evaluation.pictures import write_png
+from evaluation.wording import counted
+from evaluation.writing import replacing
 from schemas.colour import display8
-from services.cli.lines import size
-from services.looks import title
-from services.stages.pictures import write_png
-from services.wording import counted
-from services.writing import replacing
 
 if TYPE_CHECKING:
-    from services.rendering import Picture as Cost
+    from evaluation.rendering import Picture as Cost
 
 
 @dataclass(frozen=True, slots=True, repr=False, eq=False)

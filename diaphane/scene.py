@@ -7,23 +7,24 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Self
 
+from diaphane import shown
+from diaphane.bundles import bundle_folder
 from diaphane.fragments import Fragments
 from diaphane.picture import Picture
-from renderer.capture import capture
-from renderer.frame import Frame
-from renderer.scene import LoadOptions
-from schemas.glass import DEFAULT_GLASS
-from services import shown
-from services.local_scenes import LocalScene, as_usd
-from services.options import parse_tail
-from services.render_options import (
+from evaluation.choices import parse_tail
+from evaluation.local_scenes import LocalScene, as_usd
+from evaluation.render_options import (
     RenderOptions,
     loading,
     parse_background,
     parse_needs,
     parse_techniques,
 )
-from services.rendering import size_of, take
+from evaluation.rendering import size_of, take
+from renderer.capture import capture
+from renderer.frame import Frame
+from renderer.scene import LoadOptions
+from schemas.glass import DEFAULT_GLASS
 
 
 def open(
@@ -146,9 +147,9 @@ class Scene:
             background=parse_background(background),
             samples=samples,
             compare=compare,
-            state=Path(state),
         )
-        cost, shot = take(self._local, options, self._warm)
+        with bundle_folder(named, Path(state)) as folder:
+            cost, shot = take(self._local, options, folder, self._warm)
         return Picture(shot.linear, cost)
 
     def fragments(

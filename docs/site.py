@@ -17,6 +17,8 @@ PAGES = (
     "docs/*.md",
     "benchmarks/*.md",
     "benchmarks/bundle/model_card.md",
+    "evaluation/README.md",
+    "stages/README.md",
     "deploy/README.md",
     "deploy/client/*/README.md",
     "deploy/retrain/README.md",
@@ -43,7 +45,7 @@ PACKAGES = {
 """What is meant to be imported -> where it is. `services` is an application: its interface is the command line."""
 
 
-INSIDE = {"account", "gate", "samples", "usd"}
+INSIDE = {"account", "cli", "client", "gate", "local", "samples", "usd"}
 """Folders of packages that serve the package alone: they are left out."""
 
 

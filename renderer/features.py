@@ -2,7 +2,7 @@
 
 `gather` makes the sums from a fragment dump; the GL passes that fill the same texels per pixel are its twin. `FORMULAS`
 is the one source of every feature's formula: the shading languages' forms and `derive` are generated from it, and
-`stress.twins` has them once more, by hand and in float64.
+`evaluation.stress.twins` has them once more, by hand and in float64.
 
 Colours are the stored gamma-2 values / 255, luma one such number for three, weighted by the optical depth -ln(1-a) of
 the fragments in the whole units of depth bins (`renderer.depth_bins`). `front_b` is the share of the optical depth in

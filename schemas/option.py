@@ -1,4 +1,4 @@
-"""What is said of a field that is an option of commands; `services.flags` reads it."""
+"""What is said of a field that is an option of commands; `schemas.flags` reads it."""
 
 from __future__ import annotations
 

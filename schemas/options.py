@@ -1,6 +1,6 @@
 """The options of a build, each written once: type, range, default, and what it means in words.
 
-A plan has them, a job is them, and `services.flags` makes of them what a command line says. The help of the commands,
+A plan has them, a job is them, and `schemas.flags` makes of them what a command line says. The help of the commands,
 the schema of the REST API, the inputs of `deploy/retrain` and the tables of the documents follow.
 """
 

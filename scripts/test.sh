@@ -51,9 +51,9 @@ everything() {
     lane lint make --no-print-directory lint
     tests differential tests/differential
     tests chaos tests/chaos
-    tests services tests/unit/services tests/unit/client
+    tests services tests/unit/services tests/unit/diaphane tests/unit/client
     mapfile -t found < <(integration "${computing[@]}") && tests computing "${found[@]}"
-    tests modules tests/unit tests/property tests/docs --ignore=tests/unit/services --ignore=tests/unit/client
+    tests modules tests/unit tests/property tests/docs --ignore=tests/unit/{services,diaphane,client}
     tests integration tests/integration "${apart[@]/#/--ignore=}"
     mapfile -t found < <(integration "${browsers[@]}") && tests browsers "${found[@]}" tests/golden
     mapfile -t found < <(integration "${deployed[@]}") && tests deployed "${found[@]}"
@@ -63,8 +63,8 @@ everything() {
 check() {
     local quick=(-m "not installed and not dear")
     lane lint make --no-print-directory lint
-    tests services "${quick[@]}" tests/unit/services
-    tests modules "${quick[@]}" tests/unit tests/docs --ignore=tests/unit/services
+    tests services "${quick[@]}" tests/unit/services tests/unit/diaphane
+    tests modules "${quick[@]}" tests/unit tests/docs --ignore=tests/unit/{services,diaphane}
 }
 
 case "${1:-}" in

@@ -15,9 +15,9 @@ from schemas.service import SceneRecord
 from services.fine_tuning import without_champion
 from services.lineage import Begun, Own, begin_with
 from services.measured import Measured
-from services.plan import Plan, plan_of_job
 from services.registry import Registry
-from services.store import Store
+from stages.plan import Plan, plan_of_job
+from stages.store import Store
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 from schemas.problem import ExitCode, Problem
-from services.plan import Plan, PlannedScene
+from stages.plan import Plan, PlannedScene
 
 
 def scenes_of(plan: Plan) -> dict[str, str]:

@@ -7,7 +7,7 @@ from importlib.util import find_spec
 from typing import Final
 
 from schemas.problem import ExitCode, Problem
-from services.tasks import ROLES, Role
+from stages.tasks import ROLES, Role
 
 NEEDED: Final[Mapping[Role, tuple[str, ...]]] = {
     "jobs": (),

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from pxr import Ar, Sdf, Tf, Usd, UsdGeom
 
+from evaluation.wording import counted
 from renderer.convert import stage_file
 from renderer.gate import RejectedScene
 from renderer.gate.check import CheckedUpload, check_upload
@@ -19,7 +20,6 @@ from renderer.scene import LoadOptions, load_scene
 from renderer.usd.stage import OutsideHome, WarningLog, open_stage, stage_time, usd_diagnostics, used_layers
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
-from services.wording import counted
 
 WARNINGS = 50
 """Most warnings that are kept."""

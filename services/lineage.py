@@ -16,11 +16,11 @@ from schemas.pixel_weights import DEFAULT_WEIGHTS
 from schemas.problem import ExitCode, Problem
 from schemas.service import DatasetRecord
 from services.fine_tuning import check_labels, is_replayed, refuse_known, scenes_of
-from services.plan import Plan, source_of_version
 from services.registry import Registry
-from services.stages.inputs import METRIC, trained_on
-from services.stages.label import LABEL
-from services.store import Address, MissingArtifact, Store
+from stages.inputs import METRIC, trained_on
+from stages.label import LABEL
+from stages.plan import Plan, source_of_version
+from stages.store import Address, MissingArtifact, Store
 
 _SETTINGS = ("tail", "g", "metric", "seed", "weights")
 """What decides whether labels mean the same."""

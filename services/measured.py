@@ -12,13 +12,13 @@ import sqlalchemy as sa
 from pydantic import BaseModel, ConfigDict
 from sqlalchemy.dialects import postgresql, sqlite
 
+from schemas.canonical import canonical_json
 from schemas.measurement import Measurement
 from schemas.problem import ExitCode, Problem
 from schemas.service import DatasetRecord, MeasurementRecord, ShardRef
 from services.clock import iso
 from services.database import Database
 from services.database.tables import datasets, measurements
-from services.store import canonical_json
 
 _DIGEST = re.compile(r"[0-9a-f]{64}")
 

@@ -10,13 +10,13 @@ import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import PurePath
 
+from evaluation import summary
+from evaluation.wording import counted
 from schemas.bundle import Manifest
+from schemas.flags import written
 from schemas.licence import commercial_use, verdict
 from schemas.measurement import Measurement
-from services import summary
-from services.flags import written
-from services.plan import Plan
-from services.wording import counted
+from stages.plan import Plan
 
 _WORST_SCENES = 5
 _WORST_CELLS = 8

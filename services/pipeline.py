@@ -9,23 +9,26 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from evaluation import summary
+from evaluation.advice.gathered import of_measurements
 from schemas.bundle import load_manifest, network_digest, write_card
+from schemas.bundle_files import bundle_digest
 from schemas.job import JobSpec
 from schemas.measurement import Measurement, RegistryResult, SceneSummary
 from schemas.problem import ExitCode, Problem
 from schemas.service import SceneRecord, ShardRef
-from services import budgets, steps, summary
+from services import budgets, steps
 from services.acceptance import begun_plan
-from services.advice.gathered import of_measurements
 from services.fine_tuning import without_champion
 from services.model_card import command_of, model_card
-from services.plan import Plan, plan_of_job, source_of_version
-from services.records import Bundle, EvaluatedView, LabelledView, RenderedView, SceneEntry
-from services.registry import Publication, bundle_digest
-from services.stages.desk import BUNDLE, PAGE
-from services.stages.evaluate import EVALUATE
-from services.stages.report import REPORT
-from services.tasks import Runner, Source, Task
+from services.registry import Publication
+from services.runner import Runner
+from stages.desk import BUNDLE, PAGE
+from stages.evaluate import EVALUATE
+from stages.plan import Plan, plan_of_job, source_of_version
+from stages.records import Bundle, EvaluatedView, LabelledView, RenderedView, SceneEntry
+from stages.report import REPORT
+from stages.tasks import Source, Task
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +78,7 @@ def build(plan: Plan, runner: Runner) -> Built:
 
 
 def report_data(built: Built, command: str, created: str, skipped: Mapping[str, int]) -> dict[str, Any]:
-    """What the report shows, JSON, apart from what `services.stages.making.report.write` finds out itself."""
+    """What the report shows, JSON, apart from what `stages.making.report.write` finds out itself."""
     judged = [view.labelled for view in built.evaluated]
     scenes = [_scene_summary(scene, [view.rendered for view in built.views]) for scene in built.scenes]
     return {

@@ -25,7 +25,7 @@ from services.database import Database
 from services.database.tables import datasets, deliveries, events, jobs, scenes, tasks, uploads, versions
 from services.settings import Settings
 from services.storage import Blobs, Storage
-from services.store import Store
+from stages.store import Store
 
 DAY = 86400.0
 ARTIFACT_GRACE = 3600.0

@@ -74,7 +74,7 @@ SYSTEM = (
 )
 """What libraries read on their own: themselves, and what machine they are on."""
 DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom", "/dev/dri")
-OWN_PACKAGES = ("schemas", "renderer", "labeller", "trainer", "stress", "services")
+OWN_PACKAGES = ("schemas", "renderer", "labeller", "trainer", "evaluation", "stages", "services", "diaphane")
 LIBRARIES = ("EGL", "GL")
 """Libraries that are looked for by name later on."""
 

@@ -9,16 +9,17 @@ from typing import Any, NamedTuple
 
 import sqlalchemy as sa
 
+from evaluation import summary
+from evaluation.looks import technique_order
+from evaluation.pictures import stem
+from schemas.canonical import canonical_json
 from schemas.glass import DEFAULT_GLASS
 from schemas.measurement import Certificate, Measurement
-from services import summary
 from services.database import Database
 from services.database.tables import measurements as table
-from services.looks import technique_order
-from services.stages.evaluate import evaluated_from
-from services.stages.pictures import stem
-from services.store import MissingArtifact, Store, canonical_json
-from services.tasks import FACTS
+from stages.evaluate import evaluated_from
+from stages.store import MissingArtifact, Store
+from stages.tasks import FACTS
 
 _MOST_ROWS = 5_000
 _OWN = "the materials' own opacity"

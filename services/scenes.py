@@ -14,6 +14,7 @@ from typing import Any, Protocol
 
 import sqlalchemy as sa
 
+from schemas.canonical import canonical_json
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 from schemas.service import FileRef, ProblemDocument, SceneRecord, SceneState
@@ -22,7 +23,6 @@ from services.database import Database
 from services.database.tables import scenes as table
 from services.problems import Refusal
 from services.storage import Blobs
-from services.store import canonical_json
 from services.webhooks import outbox
 
 SUFFIXES = (".usd", ".usda", ".usdc", ".usdz", ".glb")

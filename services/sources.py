@@ -11,8 +11,8 @@ from pathlib import Path, PurePosixPath
 
 from schemas.problem import ExitCode, Problem
 from services.storage import Blobs
-from services.store import sync_tree
-from services.tasks import Source
+from stages.store import sync_tree
+from stages.tasks import Source
 
 YOUNG_SECONDS = 60.0
 """A folder may be so old before it is locked by whoever makes it."""

@@ -5,21 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import PurePath
 
+from evaluation.scene_warnings import said_warnings
 from schemas.measurement import Certificate, Measurement
 from schemas.problem import ExitCode, Problem
 from schemas.skips import OPAQUE_SCENES, OPAQUE_VIEWS
-from services.plan import Plan, PlannedScene
-from services.records import Bundle, EvaluatedView, LabelledView, RenderedView, SceneEntry
-from services.scene_warnings import said_warnings
-from services.stages.evaluate import EVALUATE
-from services.stages.export import EXPORT
-from services.stages.inputs import EvaluateFacts
-from services.stages.label import LABEL, LabelFacts
-from services.stages.render import RENDER
-from services.stages.scene import SCENE, SceneFacts
-from services.stages.stage import F, P, Stage
-from services.stages.train import TRAIN
-from services.tasks import Runner, Source, Task
+from services.runner import Runner
+from stages.evaluate import EVALUATE
+from stages.export import EXPORT
+from stages.inputs import EvaluateFacts
+from stages.label import LABEL, LabelFacts
+from stages.plan import Plan, PlannedScene
+from stages.records import Bundle, EvaluatedView, LabelledView, RenderedView, SceneEntry
+from stages.render import RENDER
+from stages.scene import SCENE, SceneFacts
+from stages.stage import F, P, Stage
+from stages.tasks import Source, Task
+from stages.train import TRAIN
 
 
 def read_scenes(plan: Plan, runner: Runner) -> tuple[SceneEntry, ...]:

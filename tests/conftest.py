@@ -17,10 +17,10 @@ from support.kernels import compile_in_turns
 from support.postgres import Postgres
 from support.s3 import S3Server, environment
 
+from evaluation.stress.threads import one_thread
 from renderer.context import gl_context
 from services.settings import Settings
 from services.storage import Storage, open_storage
-from stress.threads import one_thread
 
 Machine = Callable[[str], Storage]
 """Opens one storage as a machine of the given name does."""

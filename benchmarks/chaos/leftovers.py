@@ -15,7 +15,7 @@ from services.engine.rooms import KERNELS
 from services.retention import sweep, sweep_cache
 from services.settings import Settings
 from services.storage import open_storage
-from services.store import Store
+from stages.store import Store
 from tests.support.cluster import Cluster
 
 LATER_SECONDS = 2 * 24 * 3600.0

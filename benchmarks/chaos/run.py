@@ -13,9 +13,10 @@ from benchmarks.chaos.builds import families_of, upload
 from benchmarks.chaos.feeder import AT_ONCE, Feeder
 from benchmarks.chaos.leftovers import leftovers
 from benchmarks.chaos.storm import Kill, Storm
+from schemas.canonical import canonical_json
 from schemas.job import JobKind
 from services.settings import Settings
-from services.store import canonical_json, read_meta
+from stages.store import read_meta
 from tests.support.cluster import API, Cluster
 from tests.support.kernels import warm
 from tests.support.postgres import Postgres

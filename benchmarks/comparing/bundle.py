@@ -23,6 +23,8 @@ import numpy as np
 from benchmarks.casting.cases import Case, described_cases
 from benchmarks.comparing.measured import RESULTS, measurements_of, read_lines
 from benchmarks.comparing.scenes import SHARED
+from evaluation.bench.cells import bundle_of
+from evaluation.versions import commit, machine
 from labeller.curves import error_curves, whole_bins
 from labeller.hull import lower_hulls
 from labeller.shards import read_shard, write_shard
@@ -38,9 +40,7 @@ from schemas.network import DEFAULT_NETWORK, SIZES, NetworkSize
 from schemas.problem import Problem
 from schemas.scene import SceneArrays
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, DENSITY_G, TailName
-from services.bench.cells import bundle_of
 from services.model_card import model_card
-from services.versions import commit, machine
 from trainer.bundle import Description, export_bundle
 from trainer.config import TrainConfig
 from trainer.dataset import ViewData, view_data

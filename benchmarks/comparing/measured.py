@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
+from evaluation.bench.groups import said_setting
 from schemas.bench import BenchResult
 from schemas.measurement import Measurement
 from schemas.tail import TailName
-from services.bench.groups import said_setting
 
 RESULTS: Final = Path(__file__).resolve().parents[1] / "results"
 

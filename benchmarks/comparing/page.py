@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from benchmarks.comparing import tables
 from benchmarks.comparing.scenes import BUNDLE, PATH_FRAMES
 from benchmarks.comparing.work import work
+from evaluation.bench.cells import bundle_of
+from evaluation.bench.groups import Group, groups_of, said_setting
+from evaluation.bench.page import said_machines
+from evaluation.bench.plots import budget_chart
+from evaluation.report.vega import svg
+from evaluation.summary import UNFIT, said_unfit
 from schemas.bench import BenchResult, BenchView
-from services.bench.cells import bundle_of
-from services.bench.groups import Group, groups_of, said_setting
-from services.bench.page import said_machines
-from services.bench.plots import budget_chart
-from services.report.vega import svg
-from services.summary import UNFIT, said_unfit
 
 PAPER = ("minecraft_village_caves", 2.0), ("sponza", 4.0)
 """DHOIT's two rows of Tables 1 and 2: Vokselia Spawn at M = 20 MB, here another voxel scene at F = 2 WH, and Crytek

@@ -7,9 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from benchmarks.markdown import table
-from renderer.techniques import TECHNIQUES
-from schemas.bench import Basis, BenchView
-from services.bench.groups import (
+from evaluation.bench.groups import (
     ORACLE_WORDS,
     Group,
     Row,
@@ -20,8 +18,10 @@ from services.bench.groups import (
     said_technique,
     title_of,
 )
-from services.looks import title
-from services.summary import ORACLE, UNFIT, e5, geometric_mean, mean, number
+from evaluation.looks import title
+from evaluation.summary import ORACLE, UNFIT, e5, geometric_mean, mean, number
+from renderer.techniques import TECHNIQUES
+from schemas.bench import Basis, BenchView
 
 FEATURES, IMPORTANCE, BUFFER, READBACK = "feature extraction", "importance", "k-buffer", "readback"
 STAGES = (FEATURES, IMPORTANCE, BUFFER, READBACK)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from benchmarks.markdown import table
+from evaluation.bench.account import COLUMNS, said_device
+from evaluation.bench.groups import group, said_technique
 from schemas.bench import BenchView
 from schemas.work import Device
-from services.bench.account import COLUMNS, said_device
-from services.bench.groups import group, said_technique
 
 
 def work(views: Sequence[BenchView], factor: float, device: Device) -> str:

@@ -10,16 +10,16 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from evaluation.local_scenes import LocalScene
+from evaluation.stress.findings import Options
+from evaluation.stress.gl_cases import Case, Scenery
+from evaluation.stress.gl_twins import Truth, unbounded
 from renderer.capture import capture
 from renderer.frame import Frame
 from renderer.techniques import TECHNIQUES, Budget, Needs, technique
 from schemas.problem import ExitCode, Problem
 from schemas.tail import TailName
 from schemas.view import View
-from services.local_scenes import LocalScene
-from stress.findings import Options
-from stress.gl_cases import Case, Scenery
-from stress.gl_twins import Truth, unbounded
 
 PIXELS = 400
 """That are compared."""

@@ -12,6 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.graphics.checking import why
+from evaluation.bench.measure import needed
+from evaluation.bench.rounds import Run, in_turns
+from evaluation.bench.subject import Subject
 from renderer import metrics
 from renderer.techniques import TECHNIQUES, Budget, Needs, Rendered, technique
 from schemas.bench import BenchCell, CellKey
@@ -19,9 +22,6 @@ from schemas.colour import display8
 from schemas.problem import Problem
 from schemas.tail import TailName
 from schemas.work import PassWork
-from services.bench.measure import needed
-from services.bench.rounds import Run, in_turns
-from services.bench.subject import Subject
 
 REFERENCES = ("sbuffer", "abuffer-list")
 """Techniques whose picture is the exact one: the first that can render a view."""

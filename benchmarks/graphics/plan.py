@@ -8,12 +8,12 @@ from pathlib import Path
 
 from benchmarks.casting.cases import Case, described_cases
 from benchmarks.comparing.scenes import PEELING, SHARED
+from evaluation.local_scenes import LocalScene
+from evaluation.summary import ORACLE
 from renderer.samples import SAMPLES
 from renderer.samples.deep import DEEP
 from renderer.scene import LoadOptions
 from renderer.techniques import TECHNIQUES
-from services.local_scenes import LocalScene
-from services.summary import ORACLE
 
 SIZE = (1920, 1080)
 BUDGETS = (1.0, 0.25, 2.0)

@@ -9,8 +9,8 @@ from typing import Any
 from benchmarks import markdown
 from benchmarks.labelling.certified import MOST_GAP
 from benchmarks.provenance import said, said_load
-from services.report.lines import log_log
-from services.report.vega import svg
+from evaluation.report.lines import log_log
+from evaluation.report.vega import svg
 
 _TIME_PLOT, _MEMORY_PLOT = "labeller-time.svg", "labeller-memory.svg"
 Found = Mapping[str, Any]

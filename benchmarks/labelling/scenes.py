@@ -13,7 +13,7 @@ from typing import Any
 from benchmarks.casting.cases import Case
 from benchmarks.labelling.certified import certify
 from benchmarks.labelling.views import CapturedView, captured_views
-from services.versions import code_version
+from evaluation.versions import code_version
 
 _MADE_BY = ("labeller", "renderer", "benchmarks.labelling.certified", "benchmarks.labelling.views")
 

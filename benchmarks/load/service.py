@@ -15,7 +15,7 @@ from typing import Self
 
 from benchmarks.load.http import HOST
 
-START = "import sys; sys.argv[0] = 'diaphane'; from services.cli import main; main()"
+START = "import sys; sys.argv[0] = 'diaphane'; from diaphane.cli import main; main()"
 SAMPLE_SECONDS = 0.5
 UNLIMITED = {"DIAPHANE_RATE": "1000000", "DIAPHANE_BURST": "1000000"}
 """Environment of a service whose load comes from one key."""

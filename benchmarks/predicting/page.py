@@ -11,8 +11,8 @@ from benchmarks.casting.cases import MODES
 from benchmarks.predicting.summary import cost_of, front, score
 from benchmarks.predicting.views import MOST_SHARE, MULTIPLES
 from benchmarks.provenance import said
-from services.report.lines import Points, log_log
-from services.report.vega import svg
+from evaluation.report.lines import Points, log_log
+from evaluation.report.vega import svg
 
 Found = Mapping[str, Any]
 

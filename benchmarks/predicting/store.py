@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-from services.versions import code_version
+from evaluation.versions import code_version
 
 _KEY: Final = 20
 """Hex digits of a key."""

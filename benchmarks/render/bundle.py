@@ -10,11 +10,11 @@ from pathlib import Path
 import moderngl
 import numpy as np
 
+from evaluation.stress.predictors import random_layers
 from renderer.context import describe
 from renderer.features import FEATURES
 from schemas.bundle import Provenance, TailSpec, gain_outputs
 from schemas.tail import DEFAULT_TAIL, DENSITY_G, TAILS
-from stress.predictors import random_layers
 from trainer.bundle import Description, export_bundle
 from trainer.weights import Weights
 

@@ -42,7 +42,7 @@ from schemas.tail import (
 HOME: Final = Path(__file__).parent
 PYTHON: Final = HOME / "python" / "diaphane_client" / "constants.py"
 CONNECTION: Final = PYTHON.with_name("connection.py")
-CONNECTS: Final = HOME.parents[1] / "services" / "client" / "connection.py"
+CONNECTS: Final = HOME.parents[1] / "diaphane" / "client" / "connection.py"
 """How every client reaches a server; a module that needs nothing of the project."""
 HEADER: Final = HOME / "c" / "diaphane_bundle.h"
 TYPESCRIPT: Final = HOME / "web" / "packages" / "core" / "src" / "generated.ts"

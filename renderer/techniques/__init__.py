@@ -3,7 +3,7 @@
 from renderer.techniques.abuffer_array import ABufferArray
 from renderer.techniques.abuffer_list import ABufferList
 from renderer.techniques.adaptive import Adaptive
-from renderer.techniques.base import Budget, Rendered, Technique
+from renderer.techniques.base import Budget, Needs, Rendered, Technique, Twin
 from renderer.techniques.bevy import Bevy
 from renderer.techniques.binned import Binned
 from renderer.techniques.depth_peeling import DepthPeeling
@@ -16,7 +16,7 @@ from renderer.techniques.kbuffer_optimal import KBufferOptimal
 from renderer.techniques.kbuffer_temporal import KBufferTemporal
 from renderer.techniques.moment import Moment
 from renderer.techniques.multilayer import Multilayer
-from renderer.techniques.registry import TECHNIQUES, Entry, Needs, technique
+from renderer.techniques.registry import TECHNIQUES, technique
 from renderer.techniques.sbuffer import SBuffer
 from renderer.techniques.stochastic import Stochastic
 from renderer.techniques.storm_rules import StormRules
@@ -34,7 +34,6 @@ __all__ = [
     "Budget",
     "DepthPeeling",
     "DualDepthPeeling",
-    "Entry",
     "KBuffer",
     "KBufferDeep",
     "KBufferDynamic",
@@ -49,6 +48,7 @@ __all__ = [
     "Stochastic",
     "StormRules",
     "Technique",
+    "Twin",
     "Wavelet",
     "WeightedAverage",
     "WeightedBlended",

@@ -24,7 +24,7 @@ from renderer.techniques.bands import (
     over_pixels,
     read_counts,
 )
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import Budget, Rendered, Technique, Twin
 from renderer.techniques.chain import SLOT_BYTES
 from renderer.techniques.skips import frame_skips
 
@@ -34,10 +34,13 @@ _PIXEL_BYTES = 4
 """n: the cursor of the array, once the fullest pixel is known."""
 
 
-class ABufferArray:
+class ABufferArray(Technique):
     """Fixed per-pixel arrays."""
 
     name = "abuffer-array"
+    family = "exact"
+    about = "as many slots for every pixel as the fullest one needs"
+    twin = Twin("exact")
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame exactly. `budget` is not used.

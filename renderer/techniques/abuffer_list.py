@@ -24,7 +24,7 @@ from renderer.techniques.bands import (
     parts_of,
     read_counts,
 )
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import Budget, Rendered, Technique, Twin
 from renderer.techniques.skips import frame_skips
 
 NODE_BYTES = 12
@@ -41,10 +41,13 @@ _PIXEL_BYTES = 4 + 4
 _HEADS, _NODES, _USED, _COUNTS = range(4)
 
 
-class ABufferList:
+class ABufferList(Technique):
     """Per-pixel linked lists."""
 
     name = "abuffer-list"
+    family = "exact"
+    about = "a linked list a pixel"
+    twin = Twin("exact")
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame exactly. `budget` is not used: the pool holds all N fragments.

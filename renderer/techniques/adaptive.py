@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any, Self
+
 from renderer.frame import Frame
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import Budget, Needs, Rendered, Technique, Twin
 from renderer.techniques.ordered import check_nodes, render_ordered
 
 
-class Adaptive:
+class Adaptive(Technique):
     """The visibility function of every pixel, compressed to a few steps; all fragments composited with it.
 
     As the paper does on hardware without ordered access (section 4): fragments are captured, one loop over a pixel's
@@ -33,9 +36,21 @@ class Adaptive:
     """
 
     name = "adaptive"
+    family = "approximate"
+    about = "visibility in a few steps (Salvi)"
+    twin = Twin("adaptive", "submitted")
 
     def __init__(self, nodes: int = 8) -> None:
         self._nodes = check_nodes(self.name, nodes, least=2)
+
+    @classmethod
+    def of(cls, needs: Needs) -> Self:
+        """See `Technique.of`."""
+        return cls() if needs.nodes is None else cls(needs.nodes)
+
+    def parameters(self, frame: Frame) -> Mapping[str, Any]:
+        """See `Technique.parameters`."""
+        return {"nodes": self._nodes}
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame. `budget` is not used: the nodes are the budget."""

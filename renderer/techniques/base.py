@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from pathlib import Path
+from typing import Any, ClassVar, Final, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.allocation.importance import VkbOptions
 from renderer.frame import Frame
 from schemas.tail import DEFAULT_TAIL, DENSITY_G, TailName
+
+Family = Literal["exact", "bounded", "approximate"]
+"""`exact`: every fragment in order; `bounded`: core fragments within a budget, and a tail; `approximate`: sums or a few
+nodes for each pixel, whatever the budget."""
+
+Inference = Literal["glsl", "onnx"]
+"""How a bundle's network is run."""
 
 ChainForm = Literal["auto", "one-pass", "two-pass"]
 """How the bounded techniques find the nearest fragments: `auto` is one pass where the driver has 64-bit atomics."""
@@ -31,6 +41,31 @@ class Budget:
     tail: TailName = DEFAULT_TAIL
     g: float = DENSITY_G
     chain: ChainForm = "auto"
+
+
+Allocate = Callable[[Frame, Budget], NDArray[np.int32]]
+"""Gives k(p), int32 [P], for a frame and a budget."""
+
+
+@dataclass(frozen=True, slots=True)
+class Needs:
+    """What some techniques need besides a frame and a budget.
+
+    Attributes:
+        bundle: Folder of a bundle (`kbuffer-deep`, `kbuffer-temporal`).
+        allocate: The allocation to render (`kbuffer-optimal`); the labeller's, which the renderer does not know.
+        vkb: Factors of `kbuffer-importance`.
+        inference: How `kbuffer-deep` runs its network.
+        nodes: Nodes a pixel of `multilayer` and `adaptive`; None: 4 and 8, as in their papers.
+        samples: Samples a pixel of `stochastic`; None: 8.
+    """
+
+    bundle: Path | None = None
+    allocate: Allocate | None = None
+    vkb: VkbOptions = field(default_factory=VkbOptions)
+    inference: Inference = "glsl"
+    nodes: int | None = None
+    samples: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,11 +112,62 @@ class Rendered:
         return sum(self.passes.values())
 
 
-class Technique(Protocol):
-    """A way to render transparency."""
+@dataclass(frozen=True, slots=True)
+class Twin:
+    """Where a technique is computed plainly in float64.
 
-    name: str
+    Attributes:
+        module: In `renderer.reference`, with a function `picture`; None: the hybrid of core and tail in
+            `labeller.reference`.
+        takes: `sorted`: a view's fragments, front to back; `submitted`: in the order in which they are drawn.
+        slots: Fragments per pixel that an engine's pool has room for: the others are lost; None: all are kept.
+    """
 
+    module: str | None
+    takes: Literal["sorted", "submitted"] = "sorted"
+    slots: int | None = None
+
+
+HYBRID: Final = Twin(None)
+
+
+class Technique(ABC):
+    """A way to render transparency.
+
+    Attributes:
+        name: The same in shaders, tests, manifests, commands and reports.
+        family: See `Family`.
+        about: One line for lists.
+        twin: What its pictures are compared with.
+        needs_bundle: Whether it runs a bundle's network.
+        settles: Frames of a still camera after which its picture is what it is measured by; 1: every frame is by
+            itself.
+    """
+
+    name: ClassVar[str]
+    family: ClassVar[Family]
+    about: ClassVar[str]
+    twin: ClassVar[Twin]
+    needs_bundle: ClassVar[bool] = False
+    settles: ClassVar[int] = 1
+
+    @classmethod
+    def of(cls, needs: Needs) -> Self:
+        """The technique, with what it takes of some needs.
+
+        Raises:
+            Problem: What it needs was not given.
+        """
+        return cls()
+
+    def parameters(self, frame: Frame) -> Mapping[str, Any]:
+        """What its twin is given beside a frame's fragments.
+
+        Args:
+            frame: The frame.
+        """
+        return {}
+
+    @abstractmethod
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame within a budget; a technique without one does not read it."""
-        ...

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from renderer.frame import Frame
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import Budget, Rendered, Technique, Twin
 from renderer.techniques.ordered import EnginePool, render_ordered
 
 NODES = 8
@@ -14,7 +14,7 @@ POOL = EnginePool(slots=4, pixel_bytes=4 * 12 + 4)
 bytes a pixel."""
 
 
-class Bevy:
+class Bevy(Technique):
     """What Bevy 0.20 does with its defaults, on the fragments of this renderer.
 
     Read in Bevy (`crates/bevy_core_pipeline/src/oit/draw.wesl` and `resolve/oit_resolve.wesl`): a fragment takes the
@@ -32,6 +32,9 @@ class Bevy:
     """
 
     name = "bevy"
+    family = "approximate"
+    about = "Bevy's lists: 8 sorted, overflow lost"
+    twin = Twin("bevy", "submitted", POOL.slots)
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame. `budget` is not used: the pool is the engine's."""

@@ -6,10 +6,11 @@ front of it. There are no slots, no order of fragments, and no network. `kbuffer
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Mapping
+from typing import Any, Final
 
 from renderer.frame import Clock, Frame
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import HYBRID, Budget, Rendered, Technique
 from renderer.techniques.chain import TailInputs, tail_targets
 from renderer.techniques.sums import rendered, resolve_mean
 from schemas.tail import MOST_OPACITY, TAILS, TailName
@@ -17,7 +18,7 @@ from schemas.tail import MOST_OPACITY, TAILS, TailName
 DEFAULT_BINS: Final[TailName] = "binned-16"
 
 
-class Binned:
+class Binned(Technique):
     """Order-independent transparency by depth bins.
 
     Args:
@@ -25,9 +26,16 @@ class Binned:
     """
 
     name = "binned"
+    family = "approximate"
+    about = "a mean weighted by what depth bins know to be in front"
+    twin = HYBRID
 
     def __init__(self, tail: TailName = DEFAULT_BINS) -> None:
         self._tail = tail
+
+    def parameters(self, frame: Frame) -> Mapping[str, Any]:
+        """See `Technique.parameters`."""
+        return {"tail": self._tail}
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame. `budget` is not used: what is kept of a pixel does not depend on its fragments."""

@@ -8,14 +8,17 @@ depth, and the occlusion query that ends the loop is a counter of unfinished pix
 from __future__ import annotations
 
 from renderer.frame import Frame
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import Budget, Rendered, Technique, Twin
 from renderer.techniques.peeling import render_peeled
 
 
-class DepthPeeling:
+class DepthPeeling(Technique):
     """Constant memory a pixel, max(n) geometry passes."""
 
     name = "depth-peeling"
+    family = "exact"
+    about = "one layer a geometry pass"
+    twin = Twin("depth_peeling")
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame exactly. `budget` is not used."""

@@ -9,14 +9,17 @@ end: front + (1 - coverage) * (back over the background).
 from __future__ import annotations
 
 from renderer.frame import Frame
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import Budget, Rendered, Technique, Twin
 from renderer.techniques.peeling import render_peeled
 
 
-class DualDepthPeeling:
+class DualDepthPeeling(Technique):
     """Constant memory a pixel, about max(n) / 2 geometry passes."""
 
     name = "dual-depth-peeling"
+    family = "exact"
+    about = "nearest and farthest layer a geometry pass"
+    twin = Twin("dual_depth_peeling")
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame exactly. `budget` is not used."""

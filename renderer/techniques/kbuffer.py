@@ -5,17 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from renderer.frame import Frame
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import HYBRID, Budget, Rendered, Technique
 from renderer.techniques.chain import render_chain
 
 
-class KBuffer:
+class KBuffer(Technique):
     """Fixed k = floor(F / (W H)); a pixel's unused slots stay empty, as in a fixed array.
 
     No more slots than the fullest pixel has fragments: the others would be empty everywhere.
     """
 
     name = "kbuffer"
+    family = "bounded"
+    about = "the same k for every pixel of the window"
+    twin = HYBRID
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame with the same number of slots everywhere."""

@@ -10,7 +10,7 @@ picture is the same to the bit whatever the order of the fragments, but for the 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Self
 
 import moderngl
 import numpy as np
@@ -28,15 +28,13 @@ from renderer.gpu_scene import run_for, set_uniforms
 from renderer.onnx_network import OnnxNetwork
 from renderer.programs import Defines
 from renderer.screen import read_linear
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import HYBRID, Budget, Inference, Needs, Rendered, Technique
 from renderer.techniques.chain import SLOT_BYTES, Memory, TailInputs, resolve_slots, tail_targets
 from renderer.techniques.skips import PREDICTOR, UNREAD_LUMA, frame_skips
 from schemas.bundle import GLSL, ONNX, load_manifest
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
 from schemas.tail import TAILS
-
-Inference = Literal["glsl", "onnx"]
 
 _GROUP = 64
 _DISPATCH = 65535 * _GROUP
@@ -46,7 +44,7 @@ _DISPATCH = 65535 * _GROUP
 _PIXELS, _, _POOL, _, _RESULT = range(5)
 
 
-class KBufferDeep:
+class KBufferDeep(Technique):
     """The learned allocation.
 
     Args:
@@ -60,6 +58,10 @@ class KBufferDeep:
     """
 
     name = "kbuffer-deep"
+    family = "bounded"
+    about = "k(p) by a bundle's network"
+    twin = HYBRID
+    needs_bundle = True
 
     def __init__(self, bundle: Path, inference: Inference = "glsl") -> None:
         self.manifest = load_manifest(bundle)
@@ -73,6 +75,13 @@ class KBufferDeep:
         }
         self._network = OnnxNetwork(bundle / ONNX) if inference == "onnx" else None
         self._memory: Memory | None = None  # of a technique that learns from what it resolves
+
+    @classmethod
+    def of(cls, needs: Needs) -> Self:
+        """See `Technique.of`."""
+        if needs.bundle is None:
+            raise Problem(f"{cls.name} needs a bundle.", "Name the folder of one with --bundle.")
+        return cls(needs.bundle, needs.inference)
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame with predicted cuts; `sum k` is at most the budget, and less by at most one bin of one pixel.

@@ -9,14 +9,17 @@ from __future__ import annotations
 
 from renderer.allocation.dynamic import dynamic
 from renderer.frame import Clock, Frame
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import HYBRID, Budget, Rendered, Technique
 from renderer.techniques.chain import render_chain
 
 
-class KBufferDynamic:
+class KBufferDynamic(Technique):
     """The largest k for all pixels that the histogram of depth complexity fits in F."""
 
     name = "kbuffer-dynamic"
+    family = "bounded"
+    about = "the largest k for all pixels that F holds"
+    twin = HYBRID
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame with `min(k, n)` slots everywhere."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 
@@ -10,14 +11,14 @@ from renderer import timing
 from renderer.allocation.fill import budget_fill
 from renderer.allocation.importance import VkbOptions, vkb_importance
 from renderer.frame import Clock, Frame
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import HYBRID, Budget, Needs, Rendered, Technique
 from renderer.techniques.chain import render_chain, render_complete
 
 _FACING_BYTES = 4
 """Of the nearest fragment."""
 
 
-class KBufferImportance:
+class KBufferImportance(Technique):
     """Depth complexity, periphery, Fresnel and noise.
 
     Args:
@@ -25,9 +26,17 @@ class KBufferImportance:
     """
 
     name = "kbuffer-importance"
+    family = "bounded"
+    about = "k(p) by importance maps (VKB)"
+    twin = HYBRID
 
     def __init__(self, options: VkbOptions | None = None) -> None:
         self._options = options or VkbOptions()
+
+    @classmethod
+    def of(cls, needs: Needs) -> Self:
+        """See `Technique.of`."""
+        return cls(needs.vkb)
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame with slots by importance; none is computed where the budget holds every fragment."""

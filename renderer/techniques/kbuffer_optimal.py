@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Self
 
 from renderer.frame import Frame
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import HYBRID, Allocate, Budget, Needs, Rendered, Technique
 from renderer.techniques.chain import render_chain
-
-Allocate = Callable[[Frame, Budget], NDArray[np.int32]]
-"""Gives k(p), int32 [P], for a frame and a budget."""
+from schemas.problem import Problem
 
 
-class KBufferOptimal:
+class KBufferOptimal(Technique):
     """A given allocation.
 
     Args:
@@ -23,9 +18,19 @@ class KBufferOptimal:
     """
 
     name = "kbuffer-optimal"
+    family = "bounded"
+    about = "k(p) as allocated with all fragments known"
+    twin = HYBRID
 
     def __init__(self, allocate: Allocate) -> None:
         self._allocate = allocate
+
+    @classmethod
+    def of(cls, needs: Needs) -> Self:
+        """See `Technique.of`."""
+        if needs.allocate is None:
+            raise Problem(f"{cls.name} needs an allocation.", "Give one with `Needs(allocate=...)`.")
+        return cls(needs.allocate)
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame with the given slots."""

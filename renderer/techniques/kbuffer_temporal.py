@@ -34,9 +34,9 @@ from renderer.bin_pass import Binned
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene, set_uniforms
 from renderer.programs import Defines
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import Budget, Inference, Rendered
 from renderer.techniques.chain import Memory
-from renderer.techniques.kbuffer_deep import Inference, KBufferDeep
+from renderer.techniques.kbuffer_deep import KBufferDeep
 from renderer.techniques.skips import PREDICTOR
 from schemas.problem import ExitCode, Problem
 from schemas.view import View
@@ -117,6 +117,8 @@ class KBufferTemporal(KBufferDeep):
     """
 
     name = "kbuffer-temporal"
+    about = "k(p) by a network and the last frame"
+    settles = SETTLED
 
     def __init__(self, bundle: Path, inference: Inference = "glsl") -> None:
         super().__init__(bundle, inference)

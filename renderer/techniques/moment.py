@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from renderer.frame import Clock, Frame
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import Budget, Rendered, Technique, Twin
 from renderer.techniques.sums import draw_in_range, rendered, resolve_mean
 from schemas.problem import Problem
 from schemas.tail import MAX_EXPONENT
@@ -18,7 +21,7 @@ _PIXEL_BYTES = 12 + 20 + 16
 """Counts and depth range, moments, sums of weighted colour and weight."""
 
 
-class Moment:
+class Moment(Technique):
     """Two additive passes (Moment-Based Order-Independent Transparency, PACMCGIT 1(1), 2018), after the count pass.
 
     1. `b_0 = sum -ln(1-a_i)` and `b_j = sum -ln(1-a_i) x_i^j`, j = 1..4, of the warped depths x in [-1, 1].
@@ -56,6 +59,9 @@ class Moment:
     """
 
     name = "moment"
+    family = "approximate"
+    about = "transmittance from 4 power moments (Muenstermann)"
+    twin = Twin("moment")
 
     def __init__(self, bias: float = BIAS, overestimation: float = OVERESTIMATION) -> None:
         if not (1e-12 <= bias < 1.0 and 0.0 <= overestimation <= 1.0):
@@ -68,6 +74,10 @@ class Moment:
             "OVERESTIMATION": float(overestimation),
             "MAX_EXPONENT": MAX_EXPONENT,
         }
+
+    def parameters(self, frame: Frame) -> Mapping[str, Any]:
+        """See `Technique.parameters`."""
+        return {"bias": self._defines["MOMENT_BIAS"], "overestimation": self._defines["OVERESTIMATION"]}
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame. `budget` is not used: the moments take the same memory whatever n is."""

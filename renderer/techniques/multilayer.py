@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any, Self
+
 from renderer.frame import Frame
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import Budget, Needs, Rendered, Technique, Twin
 from renderer.techniques.ordered import check_nodes, render_ordered
 
 
-class Multilayer:
+class Multilayer(Technique):
     """A fixed number of blended layers a pixel (MLAB4 with the default of four).
 
     A layer is a premultiplied colour, a transmittance and a depth. A fragment is inserted in order of depth; when
@@ -31,9 +34,21 @@ class Multilayer:
     """
 
     name = "multilayer"
+    family = "approximate"
+    about = "a few layers; the farthest merge (MLAB)"
+    twin = Twin("multilayer", "submitted")
 
     def __init__(self, nodes: int = 4) -> None:
         self._nodes = check_nodes(self.name, nodes, least=1)
+
+    @classmethod
+    def of(cls, needs: Needs) -> Self:
+        """See `Technique.of`."""
+        return cls() if needs.nodes is None else cls(needs.nodes)
+
+    def parameters(self, frame: Frame) -> Mapping[str, Any]:
+        """See `Technique.parameters`."""
+        return {"nodes": self._nodes}
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame. `budget` is not used: the layers are the budget."""

@@ -14,7 +14,7 @@ import moderngl
 from renderer.frame import Clock, Frame
 from renderer.screen import ANY, TURNS, Class, read_linear, resolve_screen
 from renderer.techniques.bands import Part
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import Budget, Rendered, Technique, Twin
 from renderer.techniques.runs import LONG, PIXEL_BYTES, Runs
 from renderer.techniques.skips import frame_skips
 from schemas.problem import ExitCode, Problem
@@ -32,10 +32,13 @@ _CLASSES: tuple[Class, ...] = (
 )
 
 
-class SBuffer:
+class SBuffer(Technique):
     """The exact picture."""
 
     name = "sbuffer"
+    family = "exact"
+    about = "contiguous runs a pixel, sorted"
+    twin = Twin("exact")
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame exactly. `budget` is not used: the pool holds all N fragments.

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any, Self
+
 from renderer.frame import Clock, Frame
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import Budget, Needs, Rendered, Technique, Twin
 from renderer.techniques.sums import rendered, resolve_mean
 from schemas.limits import LIMITS
 from schemas.problem import Problem
@@ -21,7 +24,7 @@ _EMPTY = b"\xff\xff\xff\xff"
 """A depth behind all others."""
 
 
-class Stochastic:
+class Stochastic(Technique):
     """Depth-based stochastic transparency with alpha correction (Stochastic Transparency, I3D 2010, section 3).
 
     1. Every fragment covers `floor(a S + xi)` of its pixel's S samples, a random subset (stratified sampling of alpha);
@@ -48,6 +51,9 @@ class Stochastic:
     """
 
     name = "stochastic"
+    family = "approximate"
+    about = "visibility from random depth samples (Enderton)"
+    twin = Twin("stochastic")
 
     def __init__(self, samples: int = SAMPLES, seed: int = 0) -> None:
         if not 1 <= samples <= MAX_SAMPLES:
@@ -55,6 +61,15 @@ class Stochastic:
                 f"stochastic cannot work with {samples} samples a pixel.", f"Ask for 1 up to {MAX_SAMPLES} samples."
             )
         self._samples, self._seed = samples, seed
+
+    @classmethod
+    def of(cls, needs: Needs) -> Self:
+        """See `Technique.of`."""
+        return cls() if needs.samples is None else cls(needs.samples)
+
+    def parameters(self, frame: Frame) -> Mapping[str, Any]:
+        """See `Technique.parameters`."""
+        return {"samples": self._samples, "seed": self._seed}
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame. `budget` is not used: the samples take the same memory whatever n is."""

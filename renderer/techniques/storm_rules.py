@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from renderer.frame import Frame
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import Budget, Rendered, Technique, Twin
 from renderer.techniques.ordered import EnginePool, render_ordered
 
 NODES = 8
@@ -13,7 +13,7 @@ POOL = EnginePool(slots=8, pixel_bytes=8 * (16 + 4 + 4) + 4)
 """A node is RGBA32F, a float depth and an index; a pixel's head is one word: 196 bytes a pixel."""
 
 
-class StormRules:
+class StormRules(Technique):
     """What Storm, Hydra's rasteriser, does with transparent fragments, on the fragments of this renderer.
 
     Read in OpenUSD (`pxr/imaging/hdx/shaders/renderPass.glslfx`, `WriteOitLayersToBufferCommon`, and
@@ -30,6 +30,9 @@ class StormRules:
     """
 
     name = "storm-rules"
+    family = "approximate"
+    about = "Storm's lists: the last 8, overflow lost"
+    twin = Twin("storm_rules", "submitted", POOL.slots)
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame. `budget` is not used: the pool is the engine's."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from renderer.frame import Clock, Frame
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import Budget, Rendered, Technique, Twin
 from renderer.techniques.sums import draw_in_range, rendered, resolve_mean
 from schemas.tail import MAX_EXPONENT
 
@@ -13,7 +13,7 @@ _PIXEL_BYTES = 12 + 4 + 64 + 16
 _DEFINES = {"MAX_EXPONENT": MAX_EXPONENT}
 
 
-class Wavelet:
+class Wavelet(Technique):
     """Two additive passes (Wavelet Transparency, arXiv 2201.00094), after the count pass.
 
     1. The absorbance in front of a depth, `A(z) = sum of -ln(1-a_i) over z_i < z`, on a Haar basis of rank 3: a
@@ -33,6 +33,9 @@ class Wavelet:
     """
 
     name = "wavelet"
+    family = "approximate"
+    about = "transmittance from 16 Haar coefficients (Aizenshtein)"
+    twin = Twin("wavelet")
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame. `budget` is not used: the coefficients take the same memory whatever n is."""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from renderer.frame import Clock, Frame
 from renderer.screen import resolve_screen
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import Budget, Rendered, Technique, Twin
 from renderer.techniques.sums import rendered
 
 _PIXEL_BYTES = 16 + 4
 """Sums of colour and alpha, count."""
 
 
-class WeightedAverage:
+class WeightedAverage(Technique):
     """One additive pass.
 
     `C = (1 - T) sum a_i C_i / sum a_i + T C_bg` with `T = (1 - sum a_i / n)^n`: Meshkin's order-independent sum (Sort-
@@ -22,6 +22,9 @@ class WeightedAverage:
     """
 
     name = "weighted-average"
+    family = "approximate"
+    about = "mean colour, mean opacity"
+    twin = Twin("weighted_average")
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame. `budget` is not used: the sums take the same memory whatever n is."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from renderer.frame import Clock, Frame
-from renderer.techniques.base import Budget, Rendered
+from renderer.techniques.base import Budget, Rendered, Technique, Twin
 from renderer.techniques.sums import rendered, resolve_mean
 
 Equation = Literal[7, 8, 9, 10]
@@ -18,7 +19,7 @@ _PIXEL_BYTES = 16 + 4
 """Sums of weighted colour and weight, optical depth."""
 
 
-class WeightedBlended:
+class WeightedBlended(Technique):
     """One additive pass (Weighted Blended Order-Independent Transparency, JCGT 2(2), equation 6).
 
     `C = (1 - T) sum w_i a_i C_i / sum w_i a_i + T C_bg` with the exact `T = prod (1-a_i)`, taken as
@@ -42,9 +43,17 @@ class WeightedBlended:
     """
 
     name = "weighted-blended"
+    family = "approximate"
+    about = "mean weighted by depth (McGuire)"
+    twin = Twin("weighted_blended")
 
     def __init__(self, equation: Equation = 10) -> None:
         self._equation = equation
+
+    def parameters(self, frame: Frame) -> Mapping[str, Any]:
+        """See `Technique.parameters`."""
+        near, far = frame.view.clip_range(frame.gpu.scene.bounds)
+        return {"near": near, "far": far, "equation": self._equation}
 
     def render(self, frame: Frame, budget: Budget) -> Rendered:
         """Render a frame. `budget` is not used: the sums take the same memory whatever n is."""

@@ -13,8 +13,8 @@ from services.api.parts import BlobHash, DatasetIdPath, Services
 from services.api.places import moment
 from services.database import tables
 from services.problems import Refusal
-from services.stages.desk import SHARD
-from services.store import MissingArtifact
+from stages.desk import SHARD
+from stages.store import MissingArtifact
 
 router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
 

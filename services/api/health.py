@@ -12,7 +12,7 @@ from fastapi import APIRouter, Request, Response
 from services.api.answers import Live, Ready
 from services.service import Service
 from services.storage.blobs import LEAST_FREE_BYTES
-from services.tasks import ROLES
+from stages.tasks import ROLES
 
 _KEPT_SECONDS = 1.0
 _PATIENCE_SECONDS = 2.0

@@ -17,7 +17,7 @@ from schemas.webhook import DELIVERY_STATES
 from services.api.feeds import Feeds
 from services.database.tables import jobs
 from services.service import Service
-from services.tasks import ROLES
+from stages.tasks import ROLES
 
 router = APIRouter(prefix="/v1/metrics", tags=["health"])
 log = structlog.get_logger("diaphane.metrics")

@@ -11,8 +11,8 @@ from urllib.parse import urlencode
 from fastapi import Depends, Query, Request, Response
 from pydantic import Field, TypeAdapter, ValidationError
 
+from schemas.canonical import canonical_json
 from services.problems import Refusal
-from services.store import canonical_json
 
 T = TypeVar("T")
 P = TypeVar("P")

@@ -6,10 +6,9 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Response
 
+from evaluation.advice.amounts import parse_frame, parse_memory
 from schemas.advice import Advice
 from schemas.service import SceneRecord, SceneState
-from services.advice.amounts import parse_frame, parse_memory
-from services.advice.stored import stored_advice
 from services.api.answers import NewScene, ScenePage
 from services.api.body import JsonBody
 from services.api.pages import LINK_HEADER, MOMENT, Page
@@ -18,6 +17,7 @@ from services.api.places import moment
 from services.api.security import Caller, Needs
 from services.database import tables
 from services.problems import Refusal
+from services.stored_advice import stored_advice
 
 router = APIRouter(prefix="/v1/scenes", tags=["scenes"])
 

@@ -26,7 +26,7 @@ PATTERNS: Final[Mapping[str, str]] = {
     r"^[0-9a-f]{0,16}$": "what the page was given: at most 16 hex digits",
     r"^job_[0-9a-f]{24}$": "the id of a job: job_ and 24 hex digits",
     r"^scn_[0-9a-f]{32}$": "the id of a scene: scn_ and 32 hex digits",
-    r"^(?:scn_[0-9a-f]{32})?$": "the id of a scene: scn_ and 32 hex digits, or empty",
+    r"^(?:scn_[0-9a-f]{32}|[0-9a-f]{64})?$": "a scene: its id, scn_ and 32 hex digits, or its digest, or empty",
     r"^dst_[0-9a-f]{32}$": "the id of a data set: dst_ and 32 hex digits",
     r"^[a-z]{1,32}$": "1 to 32 small letters",
     r"^[a-z]{0,32}$": "at most 32 small letters",

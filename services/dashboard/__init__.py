@@ -6,7 +6,19 @@ refresh parts of pages and show values of charts: everything works without them.
 
 from fastapi import APIRouter, Depends, FastAPI
 
-from services.dashboard import assets, compare, demo, jobs, models, overview, scenes, sign_in, sign_out, webhooks
+from services.dashboard import (
+    assets,
+    compare,
+    demo,
+    jobs,
+    models,
+    overview,
+    reference,
+    scenes,
+    sign_in,
+    sign_out,
+    webhooks,
+)
 from services.dashboard.live import Watch
 from services.dashboard.sessions import Sessions
 from services.dashboard.visitor import Visitor
@@ -19,6 +31,7 @@ PAGES: tuple[APIRouter, ...] = (
     scenes.router,
     compare.router,
     webhooks.router,
+    reference.router,
     sign_out.router,
 )
 """Those that need a session."""

@@ -11,11 +11,11 @@ from fastapi import APIRouter, Request, Response
 from fastapi import Path as InPath
 from markupsafe import Markup
 
+from evaluation.report.colours import COUNT, HEAT, css_gradient
+from evaluation.report.page import TEMPLATES
+from evaluation.report.vega import DRAWING, FOLDER, RUNTIME
 from services.api.etags import is_current
 from services.problems import Refusal
-from services.report.colours import COUNT, HEAT, css_gradient
-from services.report.page import TEMPLATES
-from services.report.vega import DRAWING, FOLDER, RUNTIME
 
 HTMX = "2.0.11"
 """Version of the vendored htmx (https://htmx.org, Zero-Clause BSD); `htmx.min.js` is as released."""

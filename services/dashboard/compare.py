@@ -12,20 +12,28 @@ from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.background import BackgroundTask
 
+from evaluation.summary import BUNDLE
 from schemas.glass import DEFAULT_GLASS
 from schemas.limits import LIMITS
-from schemas.service import SceneRecord
 from services.api.etags import is_current
 from services.api.parts import PRINTED, Services
 from services.dashboard.page import PageRoute, render
 from services.dashboard.picturing import Picturing
 from services.dashboard.pixels import MOST_ROWS, Inspector, Looked
-from services.dashboard.sides import Place, Side, measured_scenes, place, views, where_measured
+from services.dashboard.sides import (
+    Place,
+    SeenScene,
+    Side,
+    measured_scenes,
+    place,
+    seen_scene,
+    views,
+    where_measured,
+)
 from services.kept import Kept
 from services.problems import Refusal
 from services.service import Service
-from services.store import MissingArtifact
-from services.summary import BUNDLE
+from stages.store import MissingArtifact
 
 router = APIRouter(prefix="/compare", route_class=PageRoute, include_in_schema=False)
 
@@ -58,7 +66,7 @@ class Where(BaseModel):
     """What is compared; empty: whatever there is.
 
     Attributes:
-        scene: Id.
+        scene: Its id, or its digest (`services.dashboard.sides.SeenScene`).
         view: Name.
         a: Key of the first side.
         b: Key of the second side.
@@ -66,7 +74,7 @@ class Where(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    scene: Annotated[str, Field(pattern=r"^(?:scn_[0-9a-f]{32})?$")] = ""
+    scene: Annotated[str, Field(pattern=r"^(?:scn_[0-9a-f]{32}|[0-9a-f]{64})?$")] = ""
     view: Annotated[str, Field(max_length=LIMITS.view_name, pattern=PRINTED)] = ""
     a: _SideKey = ""
     b: _SideKey = ""
@@ -121,7 +129,7 @@ class PictureAsked(Where):
 class Compared:
     """Two sides on a view of a scene."""
 
-    scene: SceneRecord
+    scene: SeenScene
     place: Place
     a: Side
     b: Side
@@ -129,11 +137,12 @@ class Compared:
     @property
     def command(self) -> str:
         """What makes the pictures, fragments and labels of both sides again: their evaluation, with its settings."""
+        scene = self.scene.id if self.scene.is_uploaded else f"{self.scene.name}.usd"
         sides = (self.b, self.a, *self.place.sides)
         model = next((side.shot.model for side in sides if side.shot.model), "NAME@VERSION")
         budgets = sorted({side.shot.measured.budget_factor for side in self.place.sides if not side.is_exact})
         measured, parts = self.a.shot.measured, ["diaphane jobs submit evaluate"]
-        parts += [f"--scene {self.scene.id} --model {model} --size {measured.width}x{measured.height}"]
+        parts += [f"--scene {scene} --model {model} --size {measured.width}x{measured.height}"]
         parts += [f"--budgets {','.join(f'{budget:g}' for budget in budgets)}"] if budgets else []
         parts += [f"--alpha {measured.alpha:g}"] if measured.alpha is not None else []
         parts += [f"--glass {measured.glass}"] if measured.glass != DEFAULT_GLASS else []
@@ -171,7 +180,7 @@ class Comparer:
 def show_comparison(request: Request, service: Services, look: Annotated[Look, Query()]) -> Response:
     """The page."""
     scenes = measured_scenes(service.database)
-    where = _somewhere(service, look, [scene_id for scene_id, _ in scenes])
+    where = _somewhere(service, look, [scene.id for scene in scenes])
     shared: dict[str, Any] = {
         "look": look,
         "scenes": scenes,
@@ -288,7 +297,7 @@ def _somewhere(service: Service, look: Look, known: list[str]) -> Where | None:
         if found is None:
             raise Refusal(
                 "not-found",
-                f"Nothing was measured with {look.model} on a scene that is still known.",
+                f"Nothing was measured with {look.model}.",
                 f"Submit `diaphane jobs submit evaluate --scene SCENE --model {look.model}`.",
             )
         return Where(scene=found[0], view=found[1], b=found[2])
@@ -307,9 +316,12 @@ def _compared(service: Service, where: Where, is_strict: bool = True) -> Compare
 
     Raises:
         Problem: There is no such scene.
-        Refusal: Nothing, or not that, was measured on the view.
+        Refusal: Nothing, or not that, was measured on the scene, or on the view.
     """
-    scene = service.scenes.get(where.scene)
+    scene = seen_scene(service.database, where.scene)
+    if scene is None:
+        service.scenes.get(where.scene)
+        raise Refusal("not-found", "Nothing was measured on this scene yet.", "Submit a job `evaluate` with it.")
     known = [] if where.view and is_strict else views(service.database, scene.digest)
     view = where.view if where.view in known or not known else known[0]
     there = place(service.database, scene.digest, view)

@@ -9,14 +9,14 @@ from typing import Any
 
 import sqlalchemy as sa
 
+from evaluation import summary
+from evaluation.report.fronts import MEMORY, TIME, error_chart, front_of, points_of
+from evaluation.report.lines import history_chart as chart_of_history
+from evaluation.report.vega import Spec
 from schemas.glass import DEFAULT_GLASS
 from schemas.measurement import Measurement
-from services import summary
 from services.database import Database
 from services.database.tables import measurements as table
-from services.report.fronts import MEMORY, TIME, error_chart, front_of, points_of
-from services.report.lines import history_chart as chart_of_history
-from services.report.vega import Spec
 from services.scene_views import camera_of, setting_of
 
 WORSE = 1.05

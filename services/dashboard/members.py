@@ -8,8 +8,8 @@ from collections.abc import AsyncIterator, Iterable
 from zarr.abc.store import ByteRequest, OffsetByteRequest, RangeByteRequest, Store, SuffixByteRequest
 from zarr.core.buffer import Buffer, BufferPrototype
 
-from services import store
 from services.kept import Kept
+from stages import store
 
 
 class Members(Store):

@@ -11,6 +11,7 @@ from anyio import to_thread
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, StringConstraints
 
+from evaluation.summary import BUNDLE
 from schemas.bundle import CARD, WEIGHTS, Manifest
 from schemas.licence import verdict
 from schemas.measurement import Measurement
@@ -26,7 +27,6 @@ from services.dashboard.page import PageRoute, redirect, render
 from services.dashboard.visitor import FormBody
 from services.problems import Refusal
 from services.registry.records import CANDIDATE, CHAMPION
-from services.summary import BUNDLE
 
 router = APIRouter(prefix="/models", route_class=PageRoute, include_in_schema=False)
 _publish = [Depends(Needs("publish"))]
@@ -104,6 +104,8 @@ def show_model(
         numbers=[publication.version for publication in published[::-1]][:200],
         paging=paging,
         aliases=aliases,
+        # Whoever asks for no version comes for what waits to be promoted.
+        promoted=chosen.version if version else aliases.get(CANDIDATE, chosen.version),
         aliases_offered=sorted({CHAMPION, CANDIDATE, *aliases}),
         moves=moves[:_MOVES],
         move_count=len(moves),

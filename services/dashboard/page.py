@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Coroutine, Mapping
 from datetime import datetime
 from functools import cache
+from pathlib import Path
 from traceback import format_exception
 from typing import Any, Final
 from urllib.parse import quote
@@ -17,12 +18,12 @@ from fastapi.routing import APIRoute
 from jinja2 import Environment
 from markupsafe import Markup
 
+from evaluation.report.page import environment
 from schemas.service import JobRecord, KeyRecord, Scope
 from services.api.errors import refusal_for
 from services.dashboard.assets import address, charts_script
 from services.keys import allows
 from services.problems import Refusal
-from services.report.page import environment
 
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; form-action 'self'; "
@@ -40,10 +41,12 @@ PAGES = (
     ("/scenes", "Scenes"),
     ("/compare", "Compare"),
     ("/demo", "Demo"),
+    ("/docs", "API"),
 )
 """What the navigation leads to."""
 
 _LOCAL = re.compile(r"/(?![/\\])[\x21-\x5b\x5d-\x7e]{0,1999}")  # no longer than what `/sign-in` takes
+_TEMPLATES: Final = Path(__file__).resolve().parent.parent / "templates"
 _UNITS = ((86400.0, "d"), (3600.0, "h"), (60.0, "min"), (1.0, "s"))
 
 _AGAIN = frozenset({429, 500, 503})
@@ -169,7 +172,7 @@ def _shown(request: Request) -> str:
 
 @cache
 def _environment() -> Environment:
-    made = environment()
+    made = environment(_TEMPLATES)
     made.globals.update(asset=address, charts_script=charts_script, pages=PAGES)
     made.filters.update(when=when, duration=duration, took=_took, percent=_percent, size=_size)
     return made

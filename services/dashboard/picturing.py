@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from evaluation.pictures import read_png
+from evaluation.report import colours
 from renderer.reference.flip import flip
 from services.dashboard.pixels import counts_of
 from services.dashboard.sides import Side
 from services.kept import Kept
-from services.report import colours
-from services.stages.pictures import read_png
-from services.store import Store
+from stages.store import Store
 
 
 class Picturing:

@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from evaluation.pictures import read_png
+from evaluation.report.lines import curve_chart
+from evaluation.report.vega import Spec
 from labeller import pixel as curves
 from labeller.reference import Pixel, pixel_of
 from schemas.colour import display8
@@ -18,12 +21,9 @@ from schemas.problem import ExitCode, Problem
 from schemas.tail import MetricName, TailName
 from services.dashboard.sides import Side
 from services.kept import Kept
-from services.report.lines import curve_chart
-from services.report.vega import Spec
-from services.stages.evaluate import evaluated_from
-from services.stages.inputs import METRIC
-from services.stages.pictures import read_png
-from services.store import Address, MissingArtifact, Store
+from stages.evaluate import evaluated_from
+from stages.inputs import METRIC
+from stages.store import Address, MissingArtifact, Store
 
 if TYPE_CHECKING:
     from renderer.dump_pixels import DumpReader
@@ -270,7 +270,7 @@ class Inspector:
 
     def _rules(self, side: Side, p: int) -> dict[str, int]:
         """Title of each rule -> its k at a side's budget; empty if the labels are not kept."""
-        from services.stages.allocations import GROUP, pixel_allocations  # imported late, as above
+        from stages.allocations import GROUP, pixel_allocations  # imported late, as above
 
         try:
             _, labels = evaluated_from(self._made_from(side).inputs)

@@ -10,10 +10,10 @@ import sqlalchemy as sa
 from fastapi import APIRouter, Path, Query, Request, Response
 from PIL import Image
 
+from evaluation.advice.page import part
+from evaluation.report import colours
 from schemas.limits import LIMITS
 from schemas.service import SceneState
-from services.advice.page import part
-from services.advice.stored import advice_of
 from services.api.etags import is_current
 from services.api.pages import MOMENT, Page
 from services.api.parts import SceneIdPath, Services
@@ -22,10 +22,10 @@ from services.dashboard import measured
 from services.dashboard.page import PageRoute, render
 from services.database import tables
 from services.problems import Refusal
-from services.report import colours
 from services.scene_views import SeenView, Shot, certificates, views
 from services.service import Service
-from services.store import MissingArtifact
+from services.stored_advice import advice_of
+from stages.store import MissingArtifact
 
 router = APIRouter(prefix="/scenes", route_class=PageRoute, include_in_schema=False)
 

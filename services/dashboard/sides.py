@@ -9,15 +9,15 @@ from typing import Any
 
 import sqlalchemy as sa
 
+from evaluation import summary
+from evaluation.looks import LOOKS, title
+from evaluation.pictures import EXACT
 from schemas.measurement import Measurement
-from services import summary
 from services.database import Database
 from services.database.tables import measurements as table
 from services.database.tables import scenes
-from services.looks import LOOKS, title
 from services.problems import Refusal
 from services.scene_views import Shot, newest, setting_of
-from services.stages.pictures import EXACT
 
 _MOST_ROWS = 2_000
 _MOST_SCENES = 500
@@ -176,32 +176,78 @@ def place(database: Database, digest: str, view: str) -> Place:
     )
 
 
-def measured_scenes(database: Database) -> list[tuple[str, str]]:
-    """Id and name of the scenes on which something was measured, newest first."""
-    known = sa.select(table.c.scene_digest).where(table.c.scene_digest == scenes.c.digest).exists()
-    query = sa.select(scenes.c.id, scenes.c.name).where(known).order_by(scenes.c.created.desc()).limit(_MOST_SCENES)
+@dataclass(frozen=True, slots=True)
+class SeenScene:
+    """A scene on which something was measured.
+
+    Attributes:
+        id: Of the uploaded scene; of one that was never uploaded, as those of local builds, its digest.
+        name: How it is called.
+        digest: Of its content.
+    """
+
+    id: str
+    name: str
+    digest: str
+
+    @property
+    def is_uploaded(self) -> bool:
+        """Whether the service has its files, and a page of it."""
+        return self.id != self.digest
+
+
+def measured_scenes(database: Database) -> list[SeenScene]:
+    """The scenes on which something was measured, the latest measured first."""
+    latest = (
+        sa.select(table.c.scene_digest, sa.func.max(table.c.id).label("last")).group_by(table.c.scene_digest).subquery()
+    )
+    query = _seen(table.c.id == latest.c.last).join(latest, latest.c.scene_digest == table.c.scene_digest)
     with database.read() as connection:
-        return [(row.id, row.name) for row in connection.execute(query)]
+        return [_scene(row) for row in connection.execute(query.order_by(table.c.id.desc()).limit(_MOST_SCENES))]
+
+
+def seen_scene(database: Database, scene_id: str) -> SeenScene | None:
+    """A scene by its id; None: nothing was measured on it.
+
+    Args:
+        database: Where measurements are.
+        scene_id: See `SeenScene`.
+    """
+    query = _seen((scenes.c.id == scene_id) | (table.c.scene_digest == scene_id)).order_by(table.c.id.desc()).limit(1)
+    with database.read() as connection:
+        row = connection.execute(query).first()
+    return None if row is None else _scene(row)
+
+
+def _seen(where: sa.ColumnElement[bool]) -> sa.Select[Any]:
+    """Scene of each measurement that fulfils a condition."""
+    columns = scenes.c.id, scenes.c.name, table.c.scene, table.c.scene_digest
+    return (
+        sa.select(*columns).select_from(table.outerjoin(scenes, scenes.c.digest == table.c.scene_digest)).where(where)
+    )
+
+
+def _scene(row: Any) -> SeenScene:
+    return SeenScene(row.id or row.scene_digest, row.name or row.scene, row.scene_digest)
 
 
 def where_measured(database: Database, reference: str) -> tuple[str, str, str] | None:
-    """Where a model was measured last: id of the scene, view, and key of the side; None: nowhere that is still known.
+    """Where a model was measured last: id of the scene, view, and key of the side; None: nowhere.
 
     Args:
         database: Where measurements are.
         reference: `name@version`.
     """
     query = (
-        sa.select(scenes.c.id, table.c.view, table.c.model, table.c.data)
-        .join(scenes, scenes.c.digest == table.c.scene_digest)
-        .where(table.c.model == reference)
+        _seen(table.c.model == reference)
+        .add_columns(table.c.view, table.c.model, table.c.data)
         .order_by(table.c.id.desc())
         .limit(_MOST_SCENES)
     )
     with database.read() as connection:
         rows = connection.execute(query).all()
     ran = [row for row in rows if row.data["skipped"] is None] or rows
-    return (ran[0].id, ran[0].view, _key(ran[0].data, ran[0].model)) if ran else None
+    return (_scene(ran[0]).id, ran[0].view, _key(ran[0].data, ran[0].model)) if ran else None
 
 
 def _key(data: dict[str, Any], model: str | None) -> str:

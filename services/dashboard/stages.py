@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from schemas.job import FINAL_STATES
 from schemas.service import JobRecord, StageProgress
 from services.engine.progress import STAGES_OF, WITHOUT_SCENES
-from services.stages.catalogue import STAGES
+from stages.catalogue import STAGES
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,8 +24,8 @@ from schemas.problem import Problem
 from services.engine.channel import Channel
 from services.engine.rooms import RoomStore
 from services.problems import summary_of
-from services.store import MissingArtifact
-from services.tasks import Source, Task
+from stages.store import MissingArtifact
+from stages.tasks import Source, Task
 
 PR_SET_PDEATHSIG = 1
 _REPORT_SECONDS = 0.2

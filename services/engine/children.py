@@ -30,7 +30,7 @@ from schemas.problem import ExitCode, Problem
 from services.engine import problems
 from services.engine.channel import Channel
 from services.engine.rooms import Room
-from services.store import MissingArtifact
+from stages.store import MissingArtifact
 
 READY_SECONDS = 120.0
 TICK_SECONDS = 0.2

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
+from evaluation.wording import counted
+from schemas.canonical import canonical_json
 from schemas.job import FINAL_STATES, JobKind, JobSpec, JobState, TaskState
 from schemas.problem import ExitCode, Problem
 from schemas.service import EventRecord, ExecutorRecord, JobRecord, QueueRecord, TaskRecord
@@ -24,8 +26,6 @@ from services.database.clock import clock
 from services.engine import checks, events, progress, queues, states, system
 from services.engine.events import Event
 from services.settings import Settings
-from services.store import canonical_json
-from services.wording import counted
 
 if TYPE_CHECKING:
     from dbos import DBOSClient

@@ -5,10 +5,10 @@ from __future__ import annotations
 import signal
 from typing import Final
 
+from evaluation.wording import counted
 from schemas.problem import ExitCode, Problem
 from schemas.service import ProblemDocument
 from services.problems import document_of
-from services.wording import counted
 
 FINAL_CODES: Final = (
     ExitCode.USAGE,

@@ -13,8 +13,8 @@ import sqlalchemy as sa
 from schemas.job import JobKind
 from schemas.service import StageProgress
 from services.database import tables
-from services.stages.catalogue import STAGES
-from services.tasks import StageName
+from stages.catalogue import STAGES
+from stages.tasks import StageName
 
 STAGES_OF: Mapping[JobKind, tuple[StageName, ...]] = {
     "render": ("scene", "render"),

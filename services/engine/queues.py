@@ -18,7 +18,7 @@ from schemas.job import Priority
 from services.database import Database
 from services.engine import system
 from services.settings import Settings
-from services.tasks import ROLES, Role
+from stages.tasks import ROLES, Role
 
 if TYPE_CHECKING:
     from dbos import DBOSClient

@@ -22,7 +22,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
-from services.store import META, Address, MissingArtifact, Store, remove_tree
+from stages.store import META, Address, MissingArtifact, Store, remove_tree
 
 KERNELS = "kernels"
 """Folder of what numba compiled, beside the folders of processes."""

@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING, Any, cast
 
 import structlog
 
+from evaluation.progress import Stage
 from schemas.problem import ExitCode, Problem
 from services.database import Database
 from services.engine import states, system
 from services.engine.claims import Claims
 from services.engine.states import Abandoned, Claim
 from services.engine.tasks import Tasks
-from services.progress import Stage
-from services.stages.catalogue import STAGES
-from services.store import MissingArtifact, StoreAway
-from services.tasks import FACTS, JsonFacts, StageName, Task
+from stages.catalogue import STAGES
+from stages.store import MissingArtifact, StoreAway
+from stages.tasks import FACTS, JsonFacts, StageName, Task
 
 if TYPE_CHECKING:
     from services.measured import Measured
@@ -55,25 +55,25 @@ class JobProgress:
 
     @contextmanager
     def stage(self, name: str, total: int) -> Iterator[Stage]:
-        """See `services.progress.Progress`; the runner itself tells the stages."""
+        """See `evaluation.progress.Progress`; the runner itself tells the stages."""
         yield _NoStage()
 
     def note(self, text: str) -> None:
-        """See `services.progress.Progress`."""
+        """See `evaluation.progress.Progress`."""
         self._once("note", lambda: states.note(self._database, self._job_id, ("log", {"text": text})))
 
     def skipped(self, what: str, count: int = 1) -> None:
-        """See `services.progress.Progress`."""
+        """See `evaluation.progress.Progress`."""
         self.skips[what] += count
 
 
 class _NoStage:
     def advance(self, n: int = 1, note: str = "") -> None:
-        """See `services.progress.Stage`."""
+        """See `evaluation.progress.Stage`."""
 
 
 class DurableRunner:
-    """See `services.tasks.Runner`.
+    """See `services.runner.Runner`.
 
     Args:
         claim: Of the workflow that conducts the job.
@@ -111,7 +111,7 @@ class DurableRunner:
         self._database, self._tasks, self._claims = database, tasks, claims
 
     def map(self, stage: StageName, tasks: Sequence[Task]) -> list[JsonFacts | None]:
-        """See `services.tasks.Runner`."""
+        """See `services.runner.Runner`."""
         if not tasks:
             return []
         told: dict[str, Any] = {"stage": stage, "attempt": self._attempt}
@@ -151,7 +151,7 @@ class DurableRunner:
         raise Problem(f"The stage {stage} failed: {detail}", document.remedy, ExitCode.CHECK_FAILED)
 
     def step(self, name: str, body: Callable[[], Any]) -> Any:
-        """See `services.tasks.Runner`; a problem is remembered as well as a result.
+        """See `services.runner.Runner`; a problem is remembered as well as a result.
 
         An artifact that the step needs and that is gone is made again.
         """

@@ -32,9 +32,9 @@ from services.engine.work import Worker
 from services.problems import document_of, summary_of
 from services.settings import Settings
 from services.sources import sweep_sources
-from services.tasks import ROLES, Role
 from services.webhooks.addresses import networks_of
 from services.webhooks.deliverer import Deliverer
+from stages.tasks import ROLES, Role
 
 if TYPE_CHECKING:
     from services.measured import Measured
@@ -63,7 +63,7 @@ class Bodies:
     """
 
     job: str = "services.pipeline:run_job"
-    make: str = "services.stages.bodies:make"
+    make: str = "stages.bodies:make"
     inspect: str = "services.intake:inspect"
     sandbox: str = "services.sandbox:enter"
     retry_seconds: float = 2.0

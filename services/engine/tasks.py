@@ -25,8 +25,8 @@ from services.database import Database, tables
 from services.engine import events, problems, queues, system
 from services.engine.states import PATIENCE_SECONDS, Abandoned, Cancelled, Claim, lock_job, prefix_of, read
 from services.problems import document_of
-from services.stages.catalogue import STAGES
-from services.tasks import Task
+from stages.catalogue import STAGES
+from stages.tasks import Task
 
 if TYPE_CHECKING:
     from dbos import DBOSClient

@@ -26,9 +26,9 @@ from services.engine.tasks import Begun, Place, Tasks
 from services.problems import document_of, summary_of
 from services.settings import Settings
 from services.sources import materialise
-from services.stages.catalogue import STAGES
-from services.store import MissingArtifact
-from services.tasks import Role, Task
+from stages.catalogue import STAGES
+from stages.store import MissingArtifact
+from stages.tasks import Role, Task
 
 if TYPE_CHECKING:
     from services.scenes import Scenes
@@ -159,7 +159,7 @@ class Worker:
         Raises:
             Abandoned: The claim was lost.
         """
-        from services.plan import source_of_scene
+        from stages.plan import source_of_scene
 
         record = scenes.get(scene_id)
         if record.state != "checking":

@@ -1,7 +1,6 @@
 """Published bundles: immutable signed versions, movable aliases with their history.
 
-What needs a database is imported when it is first asked for: `check_name` and the records are wanted by commands that
-have none.
+What needs a database is imported when it is first asked for: the records are wanted by commands that have none.
 """
 
 from __future__ import annotations
@@ -9,7 +8,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from services.registry.names import bundle_digest, check_name
 from services.registry.records import CANDIDATE, CHAMPION, PUBLICATION, Aliases, Move, Publication
 
 if TYPE_CHECKING:
@@ -31,8 +29,6 @@ __all__ = [
     "Publication",
     "Registry",
     "Signer",
-    "bundle_digest",
-    "check_name",
     "open_registry",
 ]
 

@@ -7,10 +7,11 @@ import uuid
 from collections.abc import Mapping
 from pathlib import Path
 
+from schemas.canonical import file_sha256
 from schemas.service import FileRef
 from services.registry.records import PUBLICATION, Publication
 from services.storage import Blobs
-from services.store import file_sha256, sync, sync_tree
+from stages.store import sync, sync_tree
 
 
 def check_out(folder: Path, publication: Publication, files: Mapping[str, FileRef], blobs: Blobs) -> Path:

@@ -31,7 +31,7 @@ from services.registry.signing import (
     verify,
 )
 from services.settings import Settings
-from services.store import sync
+from stages.store import sync
 
 _LOCK = 0x64696B65  # of the registry's key, any number that nobody else uses
 MAX_HANDOVERS = 64

@@ -19,6 +19,7 @@ from typing import Any
 import sqlalchemy as sa
 
 from schemas.bundle import MANIFEST, Manifest, load_manifest
+from schemas.bundle_files import bundle_files, check_name, digest_of
 from schemas.problem import ExitCode, Problem
 from schemas.service import ModelRecord, MoveRecord, PointerRecord, VersionRecord
 from services.database import Database
@@ -26,7 +27,6 @@ from services.database.tables import aliases, versions
 from services.registry import handovers, pointers
 from services.registry.aliases import history, local_user, lock_name, move, previous
 from services.registry.checkout import check_out
-from services.registry.names import bundle_files, check_name, digest_of
 from services.registry.records import CANDIDATE, CHAMPION, Aliases, Move, Publication
 from services.registry.rows import files_of, publication_of, signed_columns
 from services.registry.signing import Signer
@@ -34,6 +34,8 @@ from services.settings import Settings
 from services.storage import Blobs
 
 _ALIAS_LENGTH = 40
+_OF_VKB = 1.0
+"""Score of an allocation that is as good as VKB."""
 
 
 class Registry:
@@ -202,7 +204,7 @@ class Registry:
         who: str | None = None,
         promote: bool = True,
     ) -> tuple[bool, str]:
-        """Makes a version the champion if it is the first, or better than the champion on the same views.
+        """Makes a version the champion if it is the first and no worse than VKB, or better than the champion.
 
         Whatever its score, a version is promoted only if torch, ONNX and GLSL agree within the tolerance of its parity
         report. What is not promoted becomes the `candidate`.
@@ -378,6 +380,11 @@ def _compare(score: float | None, champion: Publication | None, rival: float | N
     if score is None or not math.isfinite(score):
         return False, "It has no score: no held-out view could be compared."
     if champion is None:
+        if score > _OF_VKB:
+            return False, (
+                f"Score {score:.4g}: it is the first version with a score, but worse than VKB. More scenes or steps "
+                "may help; `diaphane models promote` makes it the champion by hand."
+            )
         return True, "It is the first version with a score."
     if rival is None or not math.isfinite(rival):
         return False, (

@@ -23,10 +23,11 @@ from typing import Any, Self
 from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey, Ed25519PublicKey
 
+from schemas.canonical import canonical_json
 from schemas.problem import Problem
 from schemas.service import FileRef
 from services.settings import Settings
-from services.store import canonical_json, sync
+from stages.store import sync
 
 RELEASE_FORMAT = "diaphane-release/1"
 POINTER_FORMAT = "diaphane-pointer/1"

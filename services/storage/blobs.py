@@ -2,7 +2,7 @@
 
     root/blobs/sha256/<ab>/<sha256>     a blob; its access time is that of its last use
     root/uploads/<id>/<offset>          a part of an upload, by the offset of its first byte
-    root/tmp/                           being written, or left by a crash (`services.store` clears it)
+    root/tmp/                           being written, or left by a crash (`stages.store` clears it)
     root/damaged/                       blobs that no longer matched their name
 
 Rules:
@@ -30,9 +30,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
+from schemas.canonical import file_sha256
 from schemas.problem import ExitCode, Problem
 from schemas.service import FileRef
-from services.store import TOUCH_SECONDS, StoreAway, file_sha256, sync
+from stages.store import TOUCH_SECONDS, StoreAway, sync
 
 CHUNK = 1 << 20
 """Bytes read and written at a time."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from schemas.problem import Problem
 from services.settings import Settings
 from services.storage.blobs import Blobs
-from services.store import Store
+from stages.store import Store
 
 
 @dataclass(frozen=True)

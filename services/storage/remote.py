@@ -20,7 +20,7 @@ from obstore.exceptions import AlreadyExistsError, BaseError, PermissionDeniedEr
 from obstore.store import S3Store
 
 from schemas.problem import ExitCode, Problem
-from services.store import StoreAway
+from stages.store import StoreAway
 
 RANGE_BYTES = 16 << 20
 """Bytes of one request when a large object is read: each request is repeated by itself if its connection is cut."""

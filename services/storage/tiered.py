@@ -31,7 +31,7 @@ from typing import Any
 from services.kept import Kept
 from services.storage.blobs import CHUNK, Blobs, MissingBlob
 from services.storage.remote import RANGE_BYTES, Remote
-from services.store import META, Address, MissingArtifact, Store, StoredArtifact, parse_meta, read_meta
+from stages.store import META, Address, MissingArtifact, Store, StoredArtifact, parse_meta, read_meta
 
 ORPHAN_SECONDS = 24 * 3600.0
 """A pack that has had no meta.json for this long was left by a crash."""

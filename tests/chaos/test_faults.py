@@ -14,8 +14,8 @@ from support.chaos.settled import require
 from support.postgres import Postgres
 from support.workers import alive, until
 
-from services.stages.desk import BUNDLE
-from services.tasks import FACTS
+from stages.desk import BUNDLE
+from stages.tasks import FACTS
 
 
 @pytest.mark.mainly("sqlite")

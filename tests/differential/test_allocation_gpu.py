@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from evaluation.stress.fills import price_cases
+from evaluation.stress.gl_allocation import packed_bins, placed_cores
 from renderer.allocation.cuts import FULL, MOST_CORE, events_of, solve_cuts, usable_counts
 from renderer.allocation.gpu import BLOCK, STATE, AllocationState, FrameAllocation
 from renderer.allocation.prices import RANKS, ranks_of
 from renderer.bin_pass import Binned
 from renderer.programs import Programs
 from schemas.tail import BINNED_TAILS, TAILS, TailName
-from stress.fills import price_cases
-from stress.gl_allocation import packed_bins, placed_cores
 
 Ranks = NDArray[np.uint8]
 NAMES = list(price_cases(np.random.default_rng(0), 1, 8))

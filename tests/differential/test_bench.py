@@ -11,6 +11,11 @@ import numpy as np
 import pytest
 from support.scenes import VIEW, shells
 
+from evaluation.bench.cells import planned
+from evaluation.bench.measure import Bench
+from evaluation.bench.options import BenchOptions
+from evaluation.bench.rounds import Run, in_turns
+from evaluation.bench.subject import Subject
 from labeller.reference import exact, pixel_of
 from renderer.gpu_scene import GpuScene
 from renderer.techniques import TECHNIQUES, Budget, KBuffer, Rendered, SBuffer
@@ -18,11 +23,6 @@ from renderer.techniques.kbuffer_temporal import SETTLED
 from renderer.timing import READBACK
 from schemas.bench import LOSSLESS, BenchCell, CellKey, Yardstick
 from schemas.colour import display8, linear_to_srgb
-from services.bench.cells import planned
-from services.bench.measure import Bench
-from services.bench.options import BenchOptions
-from services.bench.rounds import Run, in_turns
-from services.bench.subject import Subject
 
 SIZE = (48, 36)
 NAMES = ("sbuffer", "moment", "kbuffer", "kbuffer-importance", "kbuffer-optimal")

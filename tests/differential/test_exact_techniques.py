@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from support import scenes
 
+from evaluation.stress import gl_stacks as stacks
 from renderer.capture import capture
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
@@ -29,7 +30,6 @@ from schemas.limits import Limits
 from schemas.problem import Problem
 from schemas.scene import SceneArrays
 from schemas.view import View
-from stress import gl_stacks as stacks
 
 EXACT: dict[str, tuple[Technique, ModuleType]] = {
     technique.name: (technique, twin)

@@ -19,6 +19,7 @@ from support import webgpu
 from support.drivers import ROOT, environment, lavapipe_installed
 from support.training import export_random, random_weights, real_features
 
+from evaluation.stress.gl_drivers import ZINK
 from renderer.features import TEXELS
 from schemas.bundle import (
     GLSL,
@@ -33,7 +34,6 @@ from schemas.bundle import (
     ParityReport,
     load_manifest,
 )
-from stress.gl_drivers import ZINK
 from trainer.half import half_outputs
 from trainer.parity import torch_outputs
 

@@ -16,6 +16,8 @@ import pytest
 from support.scenes import VIEW, shells, with_glass
 from support.training import export_random, random_weights
 
+from evaluation.stress.gl_stacks import VIEW as STACKS
+from evaluation.stress.gl_stacks import extreme_stacks, size, stack_scene
 from renderer import programs
 from renderer.account.glsl import tallied
 from renderer.bin_pass import word_defines
@@ -27,8 +29,6 @@ from renderer.hidden import hidden_fragments
 from renderer.programs import SHADERS, Defines, expand
 from renderer.techniques import TECHNIQUES, Budget, KBufferDeep, Needs, technique
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, MAX_EXPONENT, NO_TAIL, TAIL_NAMES, TAILS, TailKind
-from stress.gl_stacks import VIEW as STACKS
-from stress.gl_stacks import extreme_stacks, size, stack_scene
 
 STAGES = (".vert", ".frag", ".comp")
 FULLSCREEN = ("common/fullscreen.vert", "benchmark/empty.frag")

@@ -12,6 +12,9 @@ from support.scenes import SIZE, VIEW, shells
 from support.training import export_overflowing, export_random, random_weights
 
 from benchmarks.temporal import SHOWN, STEPS, measure, page
+from evaluation.bench.measure import over
+from evaluation.bench.subject import Subject
+from evaluation.versions import machine
 from labeller.curves import composite, error_curves
 from renderer.allocation.cuts import events_of, solve_cuts
 from renderer.features import derive, gather
@@ -25,9 +28,6 @@ from schemas.fragments import FragmentDump
 from schemas.problem import ExitCode, Problem
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, TailName
 from schemas.view import View
-from services.bench.measure import over
-from services.bench.subject import Subject
-from services.versions import machine
 
 SMALL = (64, 48)
 """Where many frames are rendered."""

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from support.training import export_random, random_weights
 
+from evaluation.stress.gl_stacks import STRIDE, VIEW, extreme_stacks, size, stack_scene
 from labeller.curves import composite
 from renderer.allocation.cuts import FULL, MOST_CORE, usable_counts
 from renderer.capture import capture
@@ -22,7 +23,6 @@ from renderer.techniques import TECHNIQUES, Adaptive, Budget, Multilayer, Needs,
 from renderer.techniques.ordered import capture_ordered
 from schemas.fragments import FragmentDump
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL, TAILS, TailName
-from stress.gl_stacks import STRIDE, VIEW, extreme_stacks, size, stack_scene
 
 LAYERS = 4096
 FEWER_LAYERS = 96

@@ -6,8 +6,8 @@ import moderngl
 import numpy as np
 import pytest
 
+from evaluation.stress.gl_moment import KINDS, ONE_FAR, bound_of, composited, lists, program
 from renderer.reference import moment as twin
-from stress.gl_moment import KINDS, ONE_FAR, bound_of, composited, lists, program
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 20, 300, 4096])

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from evaluation.pictures import read_png
 from labeller.curves import composite
 from renderer.dump import write_dump
 from renderer.exr import read_exr
@@ -16,9 +17,8 @@ from schemas.colour import display8
 from schemas.fragments import FragmentDump
 from schemas.glass import DEFAULT_GLASS
 from schemas.view import View
-from services.stages.evaluate import EvaluateParams
-from services.stages.pictures import read_png
-from services.stages.shots import Session, Shot
+from stages.evaluate import EvaluateParams
+from stages.shots import Session, Shot
 
 
 def test_a_shot_keeps_the_picture_linear_and_displayed_and_its_counts(

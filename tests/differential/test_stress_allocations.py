@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from evaluation.stress import allocations
+from evaluation.stress.bounds import BOUNDS
+from evaluation.stress.findings import Options
+from evaluation.stress.twins import exact_hull
 from labeller.allocation import Allocation
 from labeller.hull import Hulls
-from stress import allocations
-from stress.bounds import BOUNDS
-from stress.findings import Options
-from stress.twins import exact_hull
 
 QUICK = Options(quick=True)
 

@@ -9,17 +9,17 @@ from functools import cache
 import numpy as np
 import pytest
 
+from evaluation.stress import curves, features, fills
+from evaluation.stress.bounds import BOUNDS
+from evaluation.stress.cases import bin_cases, curve_cases, dump_of, some_list
+from evaluation.stress.findings import Finding, Options, Row
+from evaluation.stress.suites import Listed, rows_of
+from evaluation.stress.twins import features64, network64, sums64
 from labeller.curves import error_curves
 from renderer.allocation.cuts import Cuts
 from renderer.depth_bins import bin_form, keep_bins, kept_room, place_of
 from renderer.features import FEATURES, SUMS, derive, gather
 from schemas.tail import BIN_LIMIT, BINNED_TAILS, MOST_BINS, TAILS
-from stress import curves, features, fills
-from stress.bounds import BOUNDS
-from stress.cases import bin_cases, curve_cases, dump_of, some_list
-from stress.findings import Finding, Options, Row
-from stress.suites import Listed, rows_of
-from stress.twins import features64, network64, sums64
 
 QUICK = Options(quick=True)
 

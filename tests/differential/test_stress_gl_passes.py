@@ -9,14 +9,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from labeller import reference
-from renderer import programs
-from renderer.programs import Programs
-from renderer.reference import moment
-from renderer.techniques import TECHNIQUES, Budget, KBufferDynamic, KBufferOptimal, Needs
-from renderer.techniques.ordered import Ordered, capture_ordered
-from schemas.tail import TAILS, TailKind
-from stress import (
+from evaluation.stress import (
     gl,
     gl_allocation,
     gl_bins,
@@ -28,11 +21,18 @@ from stress import (
     gl_refused,
     gl_techniques,
 )
-from stress.findings import Broken, Finding, Options
-from stress.gl_cases import EVERY_BUDGET, Case, make_case, sceneries
-from stress.gl_drivers import GPU, LLVMPIPE, ZINK
-from stress.gl_twins import Truth, unbounded
-from stress.predictors import networks, real_features
+from evaluation.stress.findings import Broken, Finding, Options
+from evaluation.stress.gl_cases import EVERY_BUDGET, Case, make_case, sceneries
+from evaluation.stress.gl_drivers import GPU, LLVMPIPE, ZINK
+from evaluation.stress.gl_twins import Truth, unbounded
+from evaluation.stress.predictors import networks, real_features
+from labeller import reference
+from renderer import programs
+from renderer.programs import Programs
+from renderer.reference import moment
+from renderer.techniques import TECHNIQUES, Budget, KBufferDynamic, KBufferOptimal, Needs
+from renderer.techniques.ordered import Ordered, capture_ordered
+from schemas.tail import TAILS, TailKind
 
 QUICK = Options(quick=True)
 CASES = {scenery.name: scenery for scenery in sceneries(QUICK)}

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from evaluation.stress import predictors, refusals, search
+from evaluation.stress.bounds import BOUNDS
+from evaluation.stress.findings import Finding, NotRun, Options, Row
+from evaluation.stress.predictors import NEEDED, Rows, form, networks, predicted64, real_features
 from labeller.curves import composite
-from stress import predictors, refusals, search
-from stress.bounds import BOUNDS
-from stress.findings import Finding, NotRun, Options, Row
-from stress.predictors import NEEDED, Rows, form, networks, predicted64, real_features
 from trainer.weights import Weights
 
 QUICK = Options(quick=True)

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from support.scenes import SIZE, VIEW, shells
 
+from evaluation.stress import gl_stacks as stacks
 from labeller.curves import composite
 from renderer.capture import capture
 from renderer.frame import Frame
@@ -30,7 +31,6 @@ from renderer.techniques.skips import EMPTY_TILES
 from schemas.fragments import FragmentDump
 from schemas.limits import LIMITS
 from schemas.problem import Problem
-from stress import gl_stacks as stacks
 
 Twin = Callable[[FragmentDump], NDArray[np.float64]]
 

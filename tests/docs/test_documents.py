@@ -13,12 +13,12 @@ from typing import Any
 import pytest
 import typer.main
 
-from services.cli import tables
-from services.cli.app import app
+from diaphane.cli import tables
+from diaphane.cli.app import app
 
 ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("schemas", "renderer", "labeller", "trainer", "stress", "services", "diaphane")
-FOLDERS = ("", "docs/", "benchmarks/", "deploy/", "deploy/retrain/", "deploy/client/*/")
+PACKAGES = ("schemas", "renderer", "labeller", "trainer", "evaluation", "stages", "services", "diaphane")
+FOLDERS = ("", "docs/", "benchmarks/", "evaluation/", "stages/", "deploy/", "deploy/retrain/", "deploy/client/*/")
 DOCUMENTS = sorted(path.relative_to(ROOT).as_posix() for folder in FOLDERS for path in ROOT.glob(f"{folder}*.md"))
 
 DISTRIBUTIONS = {
@@ -61,7 +61,7 @@ def test_every_command_is_documented(words: str) -> None:
 
 @pytest.mark.parametrize("name", tables.FILES)
 def test_options_are_said_as_the_commands_have_them(name: str) -> None:
-    assert tables.rewritten(name, read(name)) == read(name), "run `python -m services.cli.tables`"
+    assert tables.rewritten(name, read(name)) == read(name), "run `python -m diaphane.cli.tables`"
 
 
 def anchors(document: str) -> set[str]:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from stress import bounds, report
-from stress.bounds import BOUNDS
+from evaluation.stress import bounds, report
+from evaluation.stress.bounds import BOUNDS
 
 DOCUMENT = (Path(__file__).resolve().parents[2] / "docs" / "STRESS.md").read_text(encoding="utf-8")
 AGAIN = "run `diaphane stress --markdown docs/STRESS.md`"
@@ -39,6 +39,6 @@ def test_rows_were_judged_by_the_bounds_of_the_code(path: str) -> None:
 
 
 def test_the_document_says_what_search_repeats() -> None:
-    from stress import search
+    from evaluation.stress import search
 
     assert f"climbs of {search.STEPS} changes" in DOCUMENT

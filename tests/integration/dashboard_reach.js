@@ -38,9 +38,10 @@
   const stops = "a[href], button, input, select, textarea, summary, [tabindex]";
   for (const box of document.querySelectorAll("body *")) {
     const style = getComputedStyle(box);
-    const scrolls =
+    // What a closed `details` hides cannot be scrolled by anybody.
+    const scrolls = box.checkVisibility() && (
       (/auto|scroll/.test(style.overflowX) && box.scrollWidth > box.clientWidth + 1) ||
-      (/auto|scroll/.test(style.overflowY) && box.scrollHeight > box.clientHeight + 1);
+      (/auto|scroll/.test(style.overflowY) && box.scrollHeight > box.clientHeight + 1));
     if (scrolls && box.tabIndex < 0 && !box.querySelector(stops)) found.push(`not to be scrolled by keyboard: ${box.outerHTML.slice(0, 60)}`);
     const moves = style.animationName !== "none" || style.transitionDuration.split(", ").some((one) => parseFloat(one) > 0);
     if (matchMedia("(prefers-reduced-motion: reduce)").matches && (moves || style.scrollBehavior !== "auto")) {

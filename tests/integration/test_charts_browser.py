@@ -10,8 +10,8 @@ import pytest
 from support.browser import Tab
 from support.charts import CHARTS, POINTS
 
-from services.report.page import TEMPLATES
-from services.report.vega import figure, scripts
+from evaluation.report.page import TEMPLATES
+from evaluation.report.vega import figure, scripts
 
 
 @pytest.fixture(scope="module")

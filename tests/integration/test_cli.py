@@ -17,19 +17,19 @@ from support.bundles import make_bundle
 from support.measured import example
 
 import services
+from diaphane.cli.app import run
+from diaphane.local.options import BuildOptions
+from diaphane.local.result import BuildResult
+from evaluation.progress import Progress
+from evaluation.versions import diaphane_version
 from schemas.bundle import CARD, write_card
 from schemas.measurement import RegistryResult
 from schemas.options import Options
 from schemas.problem import ExitCode, Problem
-from services.cli.app import run
 from services.database import open_database
-from services.options import BuildOptions
-from services.progress import Progress
 from services.registry import open_registry
-from services.result import BuildResult
 from services.settings import Settings
 from services.storage import open_storage
-from services.versions import diaphane_version
 
 Build = Callable[[BuildOptions, Progress], BuildResult]
 
@@ -54,9 +54,9 @@ def pipeline(monkeypatch: pytest.MonkeyPatch) -> Callable[[Build], list[BuildOpt
             asked.append(options)
             return build(options, progress)
 
-        module = ModuleType("services.build")
+        module = ModuleType("diaphane.local.build")
         vars(module)["build"] = spy
-        monkeypatch.setitem(sys.modules, "services.build", module)
+        monkeypatch.setitem(sys.modules, "diaphane.local.build", module)
         monkeypatch.setattr(services, "build", module, raising=False)
         return asked
 
@@ -93,7 +93,7 @@ BUILD = ["build", "bottles.usda", "foliage.usda", "--name", "glass", "--budgets"
 
 
 def test_help_answers_at_once() -> None:
-    command = [sys.executable, "-c", "from services.cli import main; main(['--help'])"]
+    command = [sys.executable, "-c", "from diaphane.cli import main; main(['--help'])"]
     # Processor time, because the wall time of a busy machine says little.
     assert min(_processor_seconds(command) for _ in range(3)) < 0.5
 
@@ -107,7 +107,7 @@ def _processor_seconds(command: list[str]) -> float:
 
 def test_help_loads_nothing_heavy() -> None:
     heavy = ("torch", "numba", "moderngl", "pxr", "numpy", "pydantic")
-    asked = "import sys; from services.cli.app import run; run(['--help'])"
+    asked = "import sys; from diaphane.cli.app import run; run(['--help'])"
     code = f"{asked}; print([m for m in {heavy} if m in sys.modules])"
     answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
     assert answer.stdout.splitlines()[-1] == "[]"
@@ -349,14 +349,14 @@ def test_models_are_listed_shown_promoted_and_rolled_back(folder: Path, capsys: 
 
 def test_a_real_interrupt_ends_with_130(tmp_path: Path) -> None:
     code = (
-        "import sys, time, types, services\n"
-        "module = types.ModuleType('services.build')\n"
+        "import sys, time, types, diaphane.local\n"
+        "module = types.ModuleType('diaphane.local.build')\n"
         "def build(options, progress):\n"
         "    with progress.stage('render', 9):\n"
         "        time.sleep(60)\n"
         "module.build = build\n"
-        "services.build = sys.modules['services.build'] = module\n"
-        f"from services.cli import main; main({BUILD!r})\n"
+        "diaphane.local.build = sys.modules['diaphane.local.build'] = module\n"
+        f"from diaphane.cli import main; main({BUILD!r})\n"
     )
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     child = subprocess.Popen(

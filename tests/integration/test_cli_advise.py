@@ -8,10 +8,10 @@ from pathlib import Path
 import moderngl
 import pytest
 
+from diaphane.cli.app import run
 from renderer.samples import SAMPLES
 from schemas.advice import Advice
 from schemas.problem import ExitCode
-from services.cli.app import run
 
 SMALL = ["--size", "48x32", "--views", "views.json"]
 VIEW = {"eye": [120, 60, 70], "target": [0, 0, 20], "up": [0, 0, 1], "fov": 35}

@@ -19,6 +19,9 @@ from benchmarks import suite
 from benchmarks.casting.cases import Case
 from benchmarks.comparing import scenes
 from benchmarks.comparing.scenes import PATH_FRAMES, SHARED, cases_of, parts_of
+from diaphane.cli.app import run
+from evaluation.bench.kept import ROWS
+from evaluation.summary import UNFIT, said_unfit
 from labeller.budgets import default_budgets
 from renderer import capture, exact_bytes
 from renderer.samples import SAMPLES
@@ -28,9 +31,6 @@ from schemas.bench import BenchResult
 from schemas.bundle import load_manifest
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode
-from services.bench.kept import ROWS
-from services.cli.app import run
-from services.summary import UNFIT, said_unfit
 
 ROOT = Path(services.__file__).parent.parent
 FAST = ["--size", "48x32", "--repeats", "1", "--alpha", ".33", "--equal-fragments", "--no-account"]
@@ -154,7 +154,7 @@ def test_a_run_that_was_stopped_keeps_what_was_measured_and_the_next_goes_on(
 
 def stopped(arguments: list[str], views: int, sent: signal.Signals, status: int) -> list[str]:
     """Runs a command until so many views are measured, sends a signal then; the lines of its stderr."""
-    code = f"from services.cli import main; main({arguments!r})"
+    code = f"from diaphane.cli import main; main({arguments!r})"
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     child = subprocess.Popen(
         [sys.executable, "-c", code],

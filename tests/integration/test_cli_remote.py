@@ -17,13 +17,13 @@ import pytest
 from support.fake_server import KEY, PART_BYTES, FakeServer, Fault, fake_server
 
 import services
+from diaphane.cli import inputs
+from diaphane.cli.app import run
+from diaphane.client import Client
+from diaphane.client.events import server_sent
+from diaphane.client.packing import pack
+from diaphane.client.transport import Transport
 from schemas.problem import ExitCode, Problem
-from services.cli import inputs
-from services.cli.app import run
-from services.client import Client
-from services.client.events import server_sent
-from services.client.packing import pack
-from services.client.transport import Transport
 
 ROOT = Path(services.__file__).parent.parent
 
@@ -410,7 +410,10 @@ def test_a_quarter_of_the_scenes_is_held_out_by_itself(server: FakeServer, folde
 @pytest.mark.parametrize(
     ("outcome", "status"),
     [
-        ({"state": "succeeded", "result": {"reference": "glass@1.0.0"}}, ExitCode.OK),
+        (
+            {"state": "succeeded", "result": {"reference": "glass@1.0.0", "advice": {"a": ["Use b.", "Or c."]}}},
+            ExitCode.OK,
+        ),
         (
             {"state": "failed", "problem": {"detail": "No view is left.", "remedy": "Add scenes."}},
             ExitCode.CHECK_FAILED,
@@ -429,6 +432,7 @@ def test_watching_ends_as_the_job_does(
     assert "Rendering. \\u2028Still." in captured.err
     assert captured.err.count("Rendering.") == 1
     assert str(outcome["state"]) in captured.out
+    assert ("a: Use b. Or c.\n" in captured.out) == (status is ExitCode.OK)
     if status is ExitCode.CHECK_FAILED:
         assert "failed: No view is left.\nAdd scenes. Once that is done: diaphane jobs retry job_" in captured.err
     (job_id,) = server.jobs
@@ -514,7 +518,7 @@ def test_an_interrupt_while_watching_leaves_the_job_alone(server: FakeServer, fo
         return {"state": "succeeded"}
 
     server.outcome = hold
-    command = [sys.executable, "-c", f"from services.cli import main; main(['jobs', 'watch', '{job_id}'])"]
+    command = [sys.executable, "-c", f"from diaphane.cli import main; main(['jobs', 'watch', '{job_id}'])"]
     child = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert waiting.wait(20)
     child.send_signal(signal.SIGINT)

@@ -15,6 +15,8 @@ from PIL import Image
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade
 from support.training import export_random, random_weights, real_features
 
+from diaphane.cli.app import run
+from evaluation.summary import said_unfit
 from renderer import exact_bytes
 from renderer.deep_exr import read_deep_exr
 from renderer.dump import read_dump
@@ -24,12 +26,10 @@ from renderer.techniques import TECHNIQUES, Budget, Entry, Needs, Rendered, band
 from schemas.colour import display8, linear_to_srgb, srgb_to_linear
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
-from services.cli.app import run
 from services.database import open_database
 from services.registry import open_registry
 from services.settings import Settings
 from services.storage import open_storage
-from services.summary import said_unfit
 
 SHARED = Path(__file__).resolve().parents[3] / "shared" / "scenes"
 

@@ -15,10 +15,10 @@ from support.live_service import FAILING_SEED, MENDED, Live, live_service
 from support.receiver import receiver
 
 import services
+from diaphane.cli import webhooks
+from diaphane.cli.app import run
 from schemas.problem import ExitCode
 from schemas.webhook import WEBHOOK_EVENTS
-from services.cli import webhooks
-from services.cli.app import run
 
 ROOT = Path(services.__file__).parent.parent
 SCENES = ("cups", "leaves", "bottles", "vase")
@@ -186,7 +186,7 @@ def test_a_failed_build_goes_on_when_it_is_repeated(live: Live, capsys: pytest.C
 def test_the_script_of_the_repositories_tells_better_from_worse(folder: Path, live: Live) -> None:
     programs = folder / "bin"
     programs.mkdir()
-    code = "from services.cli import main; main()"
+    code = "from diaphane.cli import main; main()"
     (programs / "diaphane").write_text(f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" -c "{code}" "$@"\n')
     (programs / "diaphane").chmod(0o755)
     environment = {"PATH": f"{programs}:/usr/bin:/bin", "DIAPHANE_URL": live.url, "DIAPHANE_KEY": live.key}

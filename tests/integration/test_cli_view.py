@@ -17,24 +17,24 @@ from support.release_server import KEY, ReleaseServer
 from support.releases import SIGNER, STRANGER, record_of, serve
 from support.training import export_random, random_weights, real_features
 
+from diaphane.cli.app import run
 from diaphane_client import server as client_server
+from evaluation.bench.rounds import Run
+from evaluation.bench.subject import Subject
+from evaluation.local_scenes import LocalScene
+from evaluation.pictures import write_png
+from evaluation.viewer import model
+from evaluation.viewer.camera import orbit
+from evaluation.viewer.model import Service, remote_source
+from evaluation.viewer.studio import Studio
 from renderer.samples import SAMPLES
 from renderer.scene import LoadOptions
 from renderer.techniques import Budget, Needs, technique
 from schemas.bench import CellKey
 from schemas.bundle import load_manifest
+from schemas.bundle_files import bundle_files
 from schemas.problem import ExitCode
 from schemas.tail import DEFAULT_TAIL
-from services.bench.rounds import Run
-from services.bench.subject import Subject
-from services.cli.app import run
-from services.local_scenes import LocalScene
-from services.registry.names import bundle_files
-from services.stages.pictures import write_png
-from services.viewer import model
-from services.viewer.camera import orbit
-from services.viewer.model import Service, remote_source
-from services.viewer.studio import Studio
 
 SIZE = (64, 48)
 
@@ -176,7 +176,7 @@ def test_an_interrupt_leaves_the_numbers_of_what_was_rendered(
         written.append(path.name)
         write_png(path, image)
 
-    monkeypatch.setattr("services.viewer.headless.write_png", write)
+    monkeypatch.setattr("evaluation.viewer.headless.write_png", write)
     arguments = ["view", str(scene), "--size", "64x48", "--layout", "single", "--frames", "3", "--out", "o"]
     assert run(arguments) == ExitCode.INTERRUPTED
     assert len((folder / "o" / "statistics.csv").read_text().splitlines()) == 2

@@ -18,6 +18,8 @@ from support.compare import CAMERA, FACTORS, HOSTILE_VIEW, MODELS, RULES, TAIL, 
 from support.dashboard import Visitor
 from support.postgres import Postgres
 
+from evaluation.pictures import counts_map, read_png, write_png
+from evaluation.report import colours
 from labeller import reference
 from labeller.hull import lower_hulls
 from renderer import metrics
@@ -31,10 +33,9 @@ from services.dashboard import sides
 from services.dashboard.compare import Comparer
 from services.dashboard.measured import history, of_version
 from services.dashboard.pixels import RULE_TITLES
+from services.database import tables
 from services.kept import Kept
-from services.report import colours
 from services.scene_views import views
-from services.stages.pictures import counts_map, read_png, write_png
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +77,20 @@ def test_the_page_offers_all_that_was_measured(reader: Visitor, filled: Filled) 
     assert reader.get("/compare").text == page  # the scene that was measured last
     linked = reader.get("/compare?model=glass@1.0.0").text
     assert re.search(r'value="glass@1.0.0:\d" selected', linked)
+
+
+def test_what_a_local_build_measured_is_compared_though_its_scene_was_never_uploaded(tmp_path: Path) -> None:
+    api = Api(tmp_path)
+    scene = fill(api, (8, 6), 6).scene
+    digest = api.service.scenes.get(scene).digest
+    with api.service.database.write() as connection:
+        connection.execute(tables.scenes.delete())
+    reader = Visitor(api, "read")
+    page = reader.get("/compare?model=glass@1.0.0").text
+    assert f'<option value="{digest}" selected>' in page
+    assert f"/scenes/{digest}" not in page
+    assert reader.get(f"/compare/picture.png?{urlencode({'scene': digest, 'view': 'front', 'a': 'exact'})}").is_success
+    assert reader.get(f"/compare?scene={scene}").status_code == 404
 
 
 def test_pages_lead_there(api: Api, reader: Visitor, filled: Filled) -> None:
@@ -435,7 +450,7 @@ def test_what_is_kept_stays_within_its_bound() -> None:
 def test_pages_need_neither_numba_nor_a_renderer() -> None:
     """The API's image has no numba, OpenGL, OpenEXR, FLIP or torch."""
     heavy = "{'numba', 'moderngl', 'OpenEXR', 'flip_evaluator', 'torch', 'pxr', 'onnx'}"
-    modules = "services.api.application, services.dashboard.compare, services.stages.allocations, renderer.dump"
+    modules = "services.api.application, services.dashboard.compare, stages.allocations, renderer.dump"
     code = f"import sys, {modules}; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, "[]\n"), done.stderr

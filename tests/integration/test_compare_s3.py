@@ -14,7 +14,7 @@ from support.dashboard import Visitor
 
 from services.dashboard.compare import Comparer
 from services.storage.remote import Remote
-from services.store import Store
+from stages.store import Store
 
 SIZE = (48, 32)
 KEYS = {"a": "kbuffer:1", "b": "glass@1.0.0:1"}
@@ -60,7 +60,7 @@ def wire(monkeypatch: pytest.MonkeyPatch) -> Wire:
 def api(s3_url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Api:
     # As many chunks as a large view has.
     monkeypatch.setattr("renderer.dump._CHUNK", 128)
-    monkeypatch.setattr("services.stages.allocations._CHUNK", 128)
+    monkeypatch.setattr("stages.allocations._CHUNK", 128)
     return Api(tmp_path, store=s3_url, rate=1e6, burst=10**6)
 
 

@@ -23,12 +23,12 @@ from schemas.service import ProblemDocument
 from services.database import tables
 from services.engine import problems
 from services.problems import document_of, without_paths
-from services.stages.allocations import pixel_allocations, read_allocation
-from services.stages.desk import BUNDLE, SHARD, load_facts, save_facts
-from services.stages.export import ExportFacts
-from services.stages.inputs import TrainFacts
-from services.stages.label import LabelFacts
-from services.store import Address, Store
+from stages.allocations import pixel_allocations, read_allocation
+from stages.desk import BUNDLE, SHARD, load_facts, save_facts
+from stages.export import ExportFacts
+from stages.inputs import TrainFacts
+from stages.label import LabelFacts
+from stages.store import Address, Store
 from trainer.weights import load_weights, save_weights
 
 SIZE = (6, 4)

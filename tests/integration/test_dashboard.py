@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import re
 import time
 from itertools import pairwise
@@ -21,7 +22,7 @@ from support.postgres import Postgres
 from support.receiver import LOOPBACK, receiver
 
 from services.api.routes import GUARDED, OPEN, routes
-from services.dashboard import OPEN_PAGES, PAGES, SESSION_ANSWERS, assets, models
+from services.dashboard import OPEN_PAGES, PAGES, SESSION_ANSWERS, assets, models, reference
 from services.dashboard.page import duration, is_local
 from services.dashboard.sessions import form_token
 from services.database import Database, tables
@@ -358,15 +359,18 @@ def test_a_job_says_what_it_was_asked_for_and_what_came_of_it(tmp_path: Path) ->
     asked = {"kind": "evaluate", "name": None, "model": "glass@1.0.0", "alpha": 0.25, "replay": False}
     evaluate, render = api.job(**asked), api.job(kind="render")
     views = [{"scene": HOSTILE, "view": "front", "fragments": n, "artifact": "x"} for n in (1000, 234)]
-    per_scene = {HOSTILE: {"score": 0.5, "rival": 0.625}}
+    per_scene = {HOSTILE: {"score": 0.5, "rival": 0.625}, "bare": {"score": None}}
+    advice = {"bare": ["Use the S-buffer.", "By memory: <b>."]}
     with api.service.database.write() as connection:
-        for job, result in ((evaluate, {"per_scene": per_scene}), (render, {"views": views})):
+        for job, result in ((evaluate, {"per_scene": per_scene, "advice": advice}), (render, {"views": views})):
             connection.execute(tables.jobs.update().where(tables.jobs.c.id == job).values(result=result))
     visitor = Visitor(api, "read")
     page = visitor.get(f"/jobs/{evaluate}").text
     for said in ("<h1>evaluate glass@1.0.0</h1>", "<dt>Alpha</dt><dd>0.25</dd>", "<dt>Replay</dt><dd>no</dd>"):
         assert said in page
     assert "<dd>0.500 against 0.625 of the champion before</dd>" in page
+    assert "<dt>Advice on bare</dt><dd>Use the S-buffer. By memory: &lt;b&gt;.</dd>" in page
+    assert "Score on bare" not in page
     assert "<dt>Seed</dt>" not in page  # as it is by default
     assert "<script>" not in page
     assert "<dt>Views</dt><dd>2 with 1 234 fragments</dd>" in visitor.get(f"/jobs/{render}").text
@@ -687,3 +691,37 @@ def test_durations_and_addresses() -> None:
     ]
     assert is_local("/jobs?a=b&c=%20")
     assert HOSTILE.startswith("<script>")
+
+
+def test_every_operation_and_schema_of_the_api_has_its_place_on_the_docs_page(empty: Api) -> None:
+    document = json.loads(empty.app.state.document())
+    page = Visitor(empty).get("/docs")
+    assert page.status_code == 200
+    places = set(re.findall(r'<details id="([^"]+)"', page.text))
+    operations = {one["operationId"] for path in document["paths"].values() for one in path.values()}
+    assert places == operations | {f"schema-{name}" for name in document["components"]["schemas"]}
+    submit = page.text.partition('<details id="submit_job">')[2].partition("</details>")[0]
+    for part in ("<strong>POST</strong>", "/v1/jobs", "submit", "idempotency-key", "Body: JobSpec", "202 JobRecord"):
+        assert part in submit
+
+
+@pytest.mark.parametrize(
+    ("schema", "words"),
+    [
+        ({"$ref": "#/components/schemas/JobSpec"}, "JobSpec"),
+        ({"anyOf": [{"type": "string"}, {"type": "null"}]}, "string or null"),
+        ({"type": "array", "items": {"enum": ["a", "b"]}}, 'list of "a" | "b"'),
+        ({"type": "object", "additionalProperties": {"type": "number"}}, "map to number"),
+        ({"const": "build"}, '"build"'),
+        ({}, "any"),
+    ],
+)
+def test_a_type_in_words(schema: dict[str, object], words: str) -> None:
+    assert reference.type_in_words(schema) == words
+
+
+def test_attributes_of_a_docstring_become_the_meanings_of_properties() -> None:
+    text = "A key.\n\nAttributes:\n    name: For people;\n        any: text.\n    scopes: What it may."
+    assert reference.attributes(text) == ("A key.", {"name": "For people; any: text.", "scopes": "What it may."})
+    assert reference.attributes("A key.") == ("A key.", {})
+    assert reference.prose("a `<b>` <c>") == "a <code>&lt;b&gt;</code> &lt;c&gt;"

@@ -57,6 +57,7 @@ def _pages(shown: Shown) -> dict[str, str]:
         "model": "/models/glass",
         "scenes": "/scenes",
         "webhooks": "/webhooks",
+        "docs": "/docs",
         "scene": f"/scenes/{shown.scene}",
         "scene-rejected": f"/scenes/{shown.rejected}",
     }
@@ -76,6 +77,16 @@ def test_every_page_is_clean(tab: Tab, shown: Shown, tmp_path: Path) -> None:
         tab.page.screenshot(path=folder / f"{name}-{width}.png", full_page=True)
         assert (folder / f"{name}-{width}.png").stat().st_size > 5000
     assert _only_status(tab, 404)
+
+
+def test_opened_parts_of_the_docs_page_are_clean(tab: Tab) -> None:
+    tab.page.goto("/docs", wait_until="load")
+    tab.page.locator("#submit_job summary").click()
+    tab.page.locator("#schema-JobSpec summary").click()
+    tab.page.locator("#submit_job pre").wait_for(state="visible")
+    tab.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    assert tab.audit() == []
+    assert tab.faults == []
 
 
 def test_pages_without_anything_to_show_say_what_to_do(empty_tab: Tab) -> None:

@@ -13,7 +13,7 @@ from support.deploy import CONTAINERS, ROOT, VARIABLE, compose, own_services, se
 
 from schemas.service import SCOPES
 from services.settings import Settings
-from services.tasks import ROLES
+from stages.tasks import ROLES
 
 SECRET = re.compile(r"PASSWORD|SECRET|_KEY|DATABASE$")
 ONE_SHOT = "buckets"

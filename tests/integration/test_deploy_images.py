@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from support.deploy import CONTAINERS, ROOT, declared, pins, roles
 
-PACKAGES = ("schemas", "renderer", "labeller", "trainer", "stress", "services")
+PACKAGES = ("schemas", "renderer", "labeller", "trainer", "evaluation", "stages", "services", "diaphane")
 
 
 def dockerfile() -> str:

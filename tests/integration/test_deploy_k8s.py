@@ -17,7 +17,7 @@ from support.postgres import Postgres
 
 from services.engine import system
 from services.settings import Settings
-from services.tasks import ROLES
+from stages.tasks import ROLES
 
 BASE = list(manifests("base"))
 KEDA = list(manifests("keda"))

@@ -20,7 +20,7 @@ from support.processes import Service
 from support.s3 import S3Server
 from support.solids import SPHERE_AND_CUBE
 
-from services.stages.catalogue import STAGES
+from stages.catalogue import STAGES
 
 SAME_AS_RENDER = "render-gpu"
 SERVICES = sorted(set(own_services()) - {SAME_AS_RENDER})

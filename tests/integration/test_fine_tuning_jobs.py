@@ -14,7 +14,7 @@ from support.cluster import API
 from support.postgres import Postgres
 from support.s3 import S3Server
 
-from services.stages.inputs import TrainedOn, trained_on
+from stages.inputs import TrainedOn, trained_on
 
 
 @pytest.fixture(scope="module")

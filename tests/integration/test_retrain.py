@@ -17,10 +17,10 @@ import yaml
 from support.fake_server import KEY, FakeServer, fake_server
 
 import services
+from diaphane.cli.app import run
+from diaphane.cli.comparison import comparison_of
+from diaphane.cli.tables import retrain_flags
 from schemas.problem import ExitCode
-from services.cli.app import run
-from services.cli.comparison import comparison_of
-from services.cli.tables import retrain_flags
 
 ROOT = Path(services.__file__).parent.parent
 RETRAIN = ROOT / "deploy" / "retrain"
@@ -301,7 +301,7 @@ def script(folder: Path, server: FakeServer, **variables: str) -> subprocess.Com
     programs = folder / "bin"
     programs.mkdir(exist_ok=True)
     (programs / "diaphane").write_text(
-        f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" -c "from services.cli import main; main()" "$@"\n'
+        f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" -c "from diaphane.cli import main; main()" "$@"\n'
     )
     (programs / "diaphane").chmod(0o755)
     environment = {"PATH": f"{programs}:/usr/bin:/bin", "DIAPHANE_URL": server.url, "DIAPHANE_KEY": KEY}

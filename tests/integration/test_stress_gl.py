@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from support.drivers import lavapipe_installed
 
+from evaluation.stress import gl
+from evaluation.stress.findings import Finding, NotRun, Options, Row
+from evaluation.stress.gl_drivers import ZINK
 from renderer.techniques import TECHNIQUES
 from schemas.tail import BINNED_TAILS, TAILS
-from stress import gl
-from stress.findings import Finding, NotRun, Options, Row
-from stress.gl_drivers import ZINK
 
 PASSES = (
     *("capture.bits", "range", "bins.kept", "bins.counts"),

@@ -46,7 +46,7 @@ class Viewed:
     def __init__(self, display: str, folder: Path, *arguments: str) -> None:
         self.display, self.folder, self._window = display, folder, ""
         self._environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
-        command = [sys.executable, "-c", "from services.cli import main; main()", "view", *arguments]
+        command = [sys.executable, "-c", "from diaphane.cli import main; main()", "view", *arguments]
         self._process = subprocess.Popen(
             command, cwd=folder, env=self._environment, stderr=subprocess.PIPE, text=True, errors="replace"
         )

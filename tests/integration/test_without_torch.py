@@ -28,7 +28,7 @@ PYTORCH = {"torch", "triton", "cuda-toolkit", "nvidia-cudnn-cu13"}
 TINY = ["--size", "48x32", "-t", "kbuffer"]
 SCRIPT = """
 import json, sys
-from services.cli.app import run
+from diaphane.cli.app import run
 print(json.dumps([run(command) for command in json.loads(sys.argv[1])]))
 """
 
@@ -87,7 +87,7 @@ def test_scenes_are_rendered_benched_and_viewed_and_a_build_says_what_it_lacks(
 
 
 def test_a_server_leaves_training_to_others(tmp_path: Path, environment: Mapping[str, str]) -> None:
-    script = [sys.executable, "-c", "from services.cli import main; main()", "serve", "--port", "0", "--state", "state"]
+    script = [sys.executable, "-c", "from diaphane.cli import main; main()", "serve", "--port", "0", "--state", "state"]
     server = subprocess.Popen(
         script, env=environment, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )

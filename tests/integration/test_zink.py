@@ -15,13 +15,13 @@ from pathlib import Path
 import pytest
 from support.drivers import ROOT, environment, facts, lavapipe_installed
 
+from evaluation.stress.gl_drivers import LLVMPIPE, ZINK
 from schemas.tail import BINNED_TAILS, DEFAULT_TAIL
-from stress.gl_drivers import LLVMPIPE, ZINK
 
 ONE_PASS = "tests/differential/test_chain_one_pass.py"
 NOT_OF_DRIVERS = {
     "test_stress_gl_passes.py",  # how the stress test judges; the stress test itself draws on every driver
-    "test_many_fragments.py",  # stacks that the stress test draws on every driver (stress/gl_stacks.py)
+    "test_many_fragments.py",  # stacks that the stress test draws on every driver (evaluation/stress/gl_stacks.py)
     "test_bench.py",  # what a benchmark plans and keeps
     "test_glsl.py",  # the reference compiler of GLSL, which is no driver's
     "test_account.py",  # what a frame's shaders count of themselves, by the dump that both drivers capture

@@ -7,17 +7,17 @@ import pytest
 from hypothesis import given, settings, target
 from hypothesis import strategies as st
 
+from evaluation.stress import search
+from evaluation.stress.bounds import BOUNDS
+from evaluation.stress.cases import dump_of
+from evaluation.stress.features import EVERY, SPREADS
+from evaluation.stress.predictors import networks, real_features
+from evaluation.stress.search import list_finding, worst_features, worst_list
+from evaluation.stress.threads import one_thread
+from evaluation.stress.twins import features64, sums64
 from renderer.features import FEATURES, derive, gather
 from schemas.fragments import FragmentDump
 from schemas.tail import METRICS, TAIL_NAMES, MetricName, TailName
-from stress import search
-from stress.bounds import BOUNDS
-from stress.cases import dump_of
-from stress.features import EVERY, SPREADS
-from stress.predictors import networks, real_features
-from stress.search import list_finding, worst_features, worst_list
-from stress.threads import one_thread
-from stress.twins import features64, sums64
 
 level = st.one_of(st.integers(0, 255), st.sampled_from([0, 1, 254, 255]))
 alpha = st.one_of(st.integers(1, 254), st.sampled_from([1, 128, 254]))

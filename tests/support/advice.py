@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from evaluation.advice.rules import candidates
 from schemas.advice import AdvisedScene, Sample, SeenView, Size, sbuffer_bytes
-from services.advice.rules import candidates
 
 FRAME = Size(width=1000, height=1000)
 MIB = 2**20

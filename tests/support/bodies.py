@@ -13,9 +13,10 @@ from typing import Any
 
 from schemas.job import JobSpec, Priority
 from schemas.problem import ExitCode, Problem
-from services.stages.desk import FolderOf
-from services.store import MissingArtifact, Store
-from services.tasks import FACTS, Report, Runner, Task
+from services.runner import Runner
+from stages.desk import FolderOf
+from stages.store import MissingArtifact, Store
+from stages.tasks import FACTS, Report, Task
 
 PLANS = "ENGINE_PLANS"
 """Variable that names the folder of plans: NAME.json, a list of {"stage", "tasks"} or {"step"}."""

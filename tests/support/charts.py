@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 
-from services.report.dots import Dot, error_dots
-from services.report.fronts import Point, error_chart
-from services.report.lines import curve_chart, history_chart, log_log, loss_chart
-from services.report.vega import Spec
+from evaluation.report.dots import Dot, error_dots
+from evaluation.report.fronts import Point, error_chart
+from evaluation.report.lines import curve_chart, history_chart, log_log, loss_chart
+from evaluation.report.vega import Spec
 
 DATA = re.compile(r"<script type=\"application/json\">[^<]*</script>")
 """What a chart shows: a block of data, which no browser runs."""

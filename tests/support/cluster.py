@@ -179,7 +179,7 @@ class Cluster:
         """Starts a process in a slot, whose last one has ended."""
         self._begun += 1
         log = self.folder / f"{self._begun:03d}-{slot.name}.log"
-        program = [sys.executable, str(Path(sys.executable).with_name("diaphane"))]
+        program = [sys.executable, "-m", "diaphane"]
         what = ["worker", "--roles", slot.kind]
         if slot.kind == API:
             what = ["serve", "--roles", "none", "--port", str(slot.port)]

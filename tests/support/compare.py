@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from evaluation.pictures import counts_map, quantise_map, stem, write_png
 from labeller.allocation import RuleName
 from labeller.curves import Curves, composite, error_curves
 from labeller.rules import allocate_curves
@@ -19,11 +20,10 @@ from schemas.fragments import FragmentDump
 from schemas.measurement import Measurement
 from schemas.tail import TailName
 from schemas.view import View as Camera
-from services.stages.desk import save_facts
-from services.stages.label import LABEL, LabelParams
-from services.stages.making import label as making
-from services.stages.pictures import counts_map, quantise_map, stem, write_png
-from services.store import Address
+from stages.desk import save_facts
+from stages.label import LABEL, LabelParams
+from stages.making import label as making
+from stages.store import Address
 from support.api import Api, measurement
 from support.dumps import random_dump
 

@@ -15,7 +15,7 @@ from PIL import Image
 from schemas.bundle import write_card
 from schemas.service import ProblemDocument
 from services.database import tables
-from services.tasks import FACTS, Task
+from stages.tasks import FACTS, Task
 from support.api import Api, build_spec, measurement
 from support.bundles import make_bundle
 

@@ -14,14 +14,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from evaluation.stress import gl_drivers
+from evaluation.stress.gl_drivers import Driver
 from renderer.capture import capture
 from renderer.context import describe, gl_context
 from renderer.frame import Frame
 from renderer.gpu_scene import GpuScene
 from renderer.techniques.chain import one_pass_available
 from schemas.tail import BINNED_TAILS
-from stress import gl_drivers
-from stress.gl_drivers import Driver
 from support.scenes import SIZE, VIEW, shells
 
 ROOT = Path(__file__).parents[2]

@@ -1,4 +1,4 @@
-"""Imports of the project's modules as Python's parser sees them: the twin of `services.closure`."""
+"""Imports of the project's modules as Python's parser sees them: the twin of `stages.closure`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-from services.closure import PACKAGES
-from services.versions import ROOT
+from evaluation.versions import ROOT
+from stages.closure import PACKAGES
 
 
 @cache

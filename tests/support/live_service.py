@@ -21,7 +21,8 @@ from typing import Any
 from schemas.job import JobSpec
 from schemas.problem import ExitCode, Problem
 from schemas.service import SceneRecord
-from services.tasks import Runner, Task
+from services.runner import Runner
+from stages.tasks import Task
 from support.bundles import make_bundle
 from support.receiver import LOOPBACK
 from support.workers import until

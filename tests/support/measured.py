@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from evaluation.report import Picture, PictureSet
 from schemas.measurement import Measurement
-from services.report import Picture, PictureSet
 
 EXAMPLE_MSE = {"kbuffer": 4e-4, "kbuffer-importance": 1e-4, "kbuffer-deep": 2e-5, "kbuffer-optimal": 1e-5}
 

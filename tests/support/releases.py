@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from schemas.bundle_files import bundle_files, digest_of
 from schemas.service import FileRef
-from services.registry.names import bundle_files, digest_of
 from services.registry.pointers import LIFETIME_SECONDS
 from services.registry.signing import SigningKey, handover_statement, pointer_statement, statement
 from support.bundles import make_bundle

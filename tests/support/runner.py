@@ -8,13 +8,13 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from evaluation.progress import SilentProgress
 from schemas.bundle import CARD
 from schemas.measurement import Measurement
 from schemas.service import DatasetRecord, SceneRecord, ShardRef
 from schemas.tail import DEFAULT_TAIL, DENSITY_G
-from services.progress import SilentProgress
-from services.stages.desk import BUNDLE
-from services.tasks import JsonFacts, StageName, Task
+from stages.desk import BUNDLE
+from stages.tasks import JsonFacts, StageName, Task
 from support.bundles import make_bundle
 
 VIEW = {"eye": (0.0, 0.0, 5.0), "target": (0.0, 0.0, 0.0), "up": (0.0, 1.0, 0.0)}

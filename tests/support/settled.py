@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from services.service import Service
-from services.store import MissingArtifact
+from stages.store import MissingArtifact
 
 PUBLISHING = ("build", "train")
 """Kinds of jobs that end with a version."""

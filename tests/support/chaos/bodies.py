@@ -23,7 +23,7 @@ def load() -> None:
 
 def make(stage: Any, desk: Any, task: Any, params: Any, folder: Path, report: Any) -> Any:
     """Makes an artifact of a stage. The larger a job's seed, the better is its bundle."""
-    from services.stages.catalogue import STAGES
+    from stages.catalogue import STAGES
 
     reach(f"{stage}:begin", artifact=task.artifact)
     for need in task.needs:
@@ -71,9 +71,9 @@ def _train(task: Any, folder: Path, desk: Any) -> dict[str, Any]:
 
 
 def _export(task: Any, folder: Path, desk: Any) -> dict[str, Any]:
-    from services.registry import bundle_digest
-    from services.stages.desk import BUNDLE
-    from services.store import file_sha256
+    from schemas.bundle_files import bundle_digest
+    from schemas.canonical import file_sha256
+    from stages.desk import BUNDLE
     from support.bundles import make_bundle
 
     weights = f"{task.params['settings']['seed']} {task.address.key}"

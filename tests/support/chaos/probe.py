@@ -38,7 +38,7 @@ POINTS = (
 )
 """Those that every build comes to, in order."""
 GATES, TRACE, FULL = "gates", "trace", "full"
-_STAND_INS = {f"services.stages.making.{stage}": stage for stage in STAGES}
+_STAND_INS = {f"stages.making.{stage}": stage for stage in STAGES}
 _POLL_SECONDS = 0.02
 
 _folder = ""
@@ -158,5 +158,5 @@ _CHANGES: dict[str, Callable[[Any], None]] = {
     "services.engine.runner": _change_runner,
     "services.registry.registry": _change_registry,
     "services.engine.jobs": _change_jobs,
-    "services.store": _change_store,
+    "stages.store": _change_store,
 }

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import sqlalchemy as sa
 
 from services.database import tables
-from services.tasks import FACTS
+from stages.tasks import FACTS
 from support.chaos.arena import Arena
 from support.chaos.bodies import DATA, TECHNIQUES, content
 from support.settled import Settled, settled

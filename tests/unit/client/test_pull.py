@@ -23,8 +23,8 @@ from support.releases import SIGNER, STRANGER, Record, pointer_to, publish, reco
 from diaphane_client import Denied, NotFound, Refused, Unavailable, cached, pull
 from diaphane_client import server as client_server
 from schemas.bundle import FILES, MANIFEST
+from schemas.bundle_files import bundle_files
 from schemas.service import FileRef
-from services.registry.names import bundle_files
 
 CLIENT = Path(__file__).parents[3] / "deploy" / "client" / "python"
 

@@ -11,11 +11,11 @@ import pytest
 from fastapi.testclient import TestClient
 from support.api import Api
 
+from diaphane.client import Client
 from diaphane_client import Denied, NotFound, Refused, Unavailable, cached, pull
 from diaphane_client import server as client_server
 from schemas.bundle import load_manifest
 from schemas.problem import ExitCode, Problem
-from services.client import Client
 from services.registry import handovers
 from services.registry.signing import KEY_FILE
 

@@ -18,14 +18,14 @@ from support.measured import example
 
 import diaphane
 from diaphane import Advised, Fragments, allocate, building
+from diaphane.local.options import BuildOptions
+from diaphane.local.result import BuildResult
+from evaluation.advice import run
+from evaluation.advice.rules import advise as ruled
+from evaluation.advice.words import sentences
 from schemas.advice import Size
 from schemas.measurement import RegistryResult
 from schemas.problem import ExitCode, Problem
-from services.advice import run
-from services.advice.rules import advise as ruled
-from services.advice.words import sentences
-from services.options import BuildOptions
-from services.result import BuildResult
 
 RGBA = np.array([[200, 40, 40, 128], [40, 200, 40, 128], [40, 40, 200, 128]], np.uint8)
 ARRAYS = {"counts": np.array([[3, 0]]), "rgba": RGBA, "depth": [1.0, 2.0, 3.0]}
@@ -68,7 +68,7 @@ def test_fragments_are_the_arrays_of_the_dump() -> None:
 
 
 def test_what_objects_show_is_text_and_not_markup() -> None:
-    from services.client import Record, Records
+    from diaphane.client import Record, Records
 
     one = Record(id="<script>", state="a & b", stages=[{}, {}])
     assert "<script>" not in one._repr_html_()
@@ -84,7 +84,7 @@ def test_advice_shows_its_sentences_and_table(tmp_path: Path, monkeypatch: pytes
     advice = advice.model_copy(update={"text": sentences(advice)})
     asked = []
 
-    def advised(options: object) -> list[run.Advised]:
+    def advised(options: object, folder: Path | None) -> list[run.Advised]:
         asked.append(options)
         return [run.Advised(Path("a.usda"), advice, None)]
 

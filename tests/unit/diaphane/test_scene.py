@@ -10,10 +10,10 @@ import pytest
 from PIL import Image
 
 import diaphane
+from diaphane.cli.app import run
 from renderer.dump import read_dump
 from renderer.samples import SAMPLES
 from schemas.problem import ExitCode, Problem
-from services.cli.app import run
 
 PLY = """ply
 format ascii 1.0

@@ -24,15 +24,15 @@ from services.database import open_database
 from services.fine_tuning import is_replayed
 from services.measured import Measured
 from services.pipeline import JobContext, run_job
-from services.plan import Plan, plan_of_job
 from services.registry import Registry, open_registry
 from services.retention import DAY, sweep
 from services.settings import Settings
-from services.stages.inputs import METRIC, trained_on
-from services.stages.label import LabelParams
-from services.stages.train import TRAIN
 from services.storage import Blobs, Storage
-from services.store import Address, Store
+from stages.inputs import METRIC, trained_on
+from stages.label import LabelParams
+from stages.plan import Plan, plan_of_job
+from stages.store import Address, Store
+from stages.train import TRAIN
 
 OLD, BOTH, NEW, UNSEEN = (scene(n, name) for n, name in enumerate(("old", "both", "new", "unseen")))
 SCENES = {record.id: record for record in (OLD, BOTH, NEW, UNSEEN)}

@@ -14,8 +14,8 @@ from schemas.job import JobSpec
 from schemas.problem import Problem
 from services.engine.progress import STAGES_OF
 from services.pipeline import JobContext, run_job
-from services.stages.catalogue import STAGES
-from services.tasks import StageName, Task
+from stages.catalogue import STAGES
+from stages.tasks import StageName, Task
 
 SCENES = {record.id: record for record in (scene(1, "bottles"), scene(2, "knots"), scene(3, "town"))}
 JOB = JobContext(id="job_0", created="2026-01-01T00:00:00+00:00")

@@ -17,9 +17,10 @@ import sqlalchemy as sa
 from support.bundles import TOLERANCE, make_bundle
 
 from schemas.bundle import FILES, load_manifest
+from schemas.bundle_files import bundle_digest, check_name
 from schemas.problem import ExitCode, Problem
 from services.database import open_database, tables
-from services.registry import CANDIDATE, CHAMPION, PUBLICATION, Registry, bundle_digest, check_name, open_registry
+from services.registry import CANDIDATE, CHAMPION, PUBLICATION, Registry, open_registry
 from services.registry.signing import verify
 from services.settings import Settings
 from services.storage import MissingBlob, Storage, open_storage
@@ -198,6 +199,16 @@ def test_what_is_not_promoted_is_the_candidate(registry: Registry, tmp_path: Pat
     for weights, score in (("a", 0.5), ("b", 0.6), ("c", 0.7)):
         publish(registry, tmp_path, weights, score)
     assert registry.aliases("glass").aliases == {"champion": "1.0.0", "candidate": "1.2.0"}
+
+
+@pytest.mark.parametrize(("score", "expected"), [(1.0, CHAMPION), (1.01, CANDIDATE)])
+def test_a_first_version_that_is_worse_than_vkb_is_no_champion(
+    registry: Registry, tmp_path: Path, score: float, expected: str
+) -> None:
+    publication = registry.publish("glass", make_bundle(tmp_path / "bundle"), score, EVALUATION)
+    promoted, reason = registry.consider(publication, score, None)
+    assert registry.aliases("glass").aliases == {expected: "1.0.0"}
+    assert ("worse than VKB" in reason) is not promoted
 
 
 def test_a_better_version_stays_a_candidate_where_that_was_asked(registry: Registry, tmp_path: Path) -> None:
@@ -389,9 +400,7 @@ def _rows(tmp_path: Path) -> list[tuple[object, ...]]:
 
 
 def test_names_are_checked_without_a_database_or_an_object_store() -> None:
-    code = (
-        "import sys, services.registry as r; r.check_name('glass'); print({'sqlalchemy', 'obstore'} & set(sys.modules))"
-    )
+    code = "import sys, services.registry as r; r.CHAMPION; print({'sqlalchemy', 'obstore'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert done.stdout == "set()\n"
 

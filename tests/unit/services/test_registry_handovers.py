@@ -15,8 +15,8 @@ import pytest
 import sqlalchemy as sa
 from support.bundles import make_bundle
 
+from diaphane.cli.app import run
 from schemas.problem import ExitCode, Problem
-from services.cli.app import run
 from services.database import Database, open_database, tables
 from services.registry import Registry, handovers, open_registry
 from services.registry.signing import KEY_FILE, NEXT_KEY_FILE, Signer, SigningKey, verify

@@ -32,7 +32,7 @@ from services.retention import (
 )
 from services.settings import Settings
 from services.storage import Blobs, Storage
-from services.store import Address, Store, StoredArtifact
+from stages.store import Address, Store, StoredArtifact
 
 NOW = 2_000_000_000.0
 ARTIFACTS = [f"{stage}/{n:064x}" for n, stage in enumerate(("render", "render", "label", "label", "train", "export"))]

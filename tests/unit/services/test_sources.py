@@ -7,7 +7,7 @@ from pathlib import Path
 
 from services.sources import YOUNG_SECONDS, materialise, sweep_sources
 from services.storage import Blobs
-from services.tasks import Source
+from stages.tasks import Source
 
 
 def test_a_source_is_laid_out_once_and_nothing_is_left_beside_it(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from services.settings import Settings
 from services.storage import Storage, open_storage
 from services.storage.remote import Remote
 from services.storage.tiered import ORPHAN_SECONDS, TieredStore
-from services.store import META, Address, MissingArtifact, Store
+from stages.store import META, Address, MissingArtifact, Store
 
 ADDRESS = Address("label", "v1", ("a", "b"), {"g": 0.75, "tail": "density"})
 ARTIFACT = ADDRESS.artifact
@@ -114,7 +114,7 @@ def test_a_use_is_written_down_and_does_not_look_like_a_change(
     past = store.path(ADDRESS).stat().st_mtime - 1_000_000
     os.utime(store.path(ADDRESS), (past, past))
     monkeypatch.setattr("services.storage.remote.USED_SECONDS", -1)
-    monkeypatch.setattr("services.store.file_sha256", lambda _: pytest.fail("it was read again"))
+    monkeypatch.setattr("stages.store.file_sha256", lambda _: pytest.fail("it was read again"))
     store.fetch(ARTIFACT)
     (found,) = store.artifacts()
     assert found.last_used > past + 900_000
@@ -152,7 +152,7 @@ def test_a_full_disk_is_an_os_error_and_leaves_nothing(machine: Machine, monkeyp
         raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("services.store.sync_tree", full)
+        patch.setattr("stages.store.sync_tree", full)
         with pytest.raises(OSError, match="No space left"):
             make(store)
     assert not store.holds(ARTIFACT)

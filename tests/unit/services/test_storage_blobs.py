@@ -17,13 +17,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from obstore.exceptions import GenericError
 
+from schemas.canonical import file_sha256
 from schemas.problem import ExitCode, Problem
 from services.settings import Settings
 from services.storage import MissingBlob, Storage, open_storage
 from services.storage import blobs as module
 from services.storage.blobs import Blobs
 from services.storage.remote import Remote
-from services.store import file_sha256
 
 UPLOAD = "upl_" + "ab" * 12
 Machine = Callable[[str], Storage]

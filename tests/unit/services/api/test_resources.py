@@ -11,7 +11,7 @@ from support.postgres import Postgres
 
 from services.database import tables
 from services.registry.signing import verify
-from services.store import Address
+from stages.store import Address
 
 
 def test_a_job_is_submitted_once_for_a_key(api: Api) -> None:

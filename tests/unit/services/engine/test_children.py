@@ -15,8 +15,8 @@ from support.workers import ROOT, alive, until
 from schemas.problem import ExitCode, Problem
 from services.engine.children import Child, ChildOptions, Hooks, Lost, Spawner
 from services.engine.problems import TaskError
-from services.store import MissingArtifact, Store
-from services.tasks import Task
+from stages.store import MissingArtifact, Store
+from stages.tasks import Task
 
 
 @pytest.fixture

@@ -12,10 +12,11 @@ from pathlib import Path
 import pytest
 from support.workers import ROOT
 
+from schemas.canonical import canonical_json
 from services.engine.children import Assignment, Child, ChildOptions, Hooks, Spawner
 from services.engine.rooms import KERNELS, Room, Scratch, link_tree
-from services.store import Address, Store, canonical_json
-from services.tasks import Task
+from stages.store import Address, Store
+from stages.tasks import Task
 
 HOLDER = """
 import sys, time

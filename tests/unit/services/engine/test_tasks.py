@@ -16,7 +16,7 @@ from services.engine import states, system
 from services.engine.housekeeping import Housekeeping
 from services.engine.states import Abandoned, Cancelled, Claim
 from services.engine.tasks import Place, Tasks
-from services.tasks import Task
+from stages.tasks import Task
 
 ME = "executor-1"
 

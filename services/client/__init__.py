@@ -1,6 +1,0 @@
-"""A server's REST interface as Python calls: what the commands that talk to a server use, and `diaphane.Client`."""
-
-from services.client.client import Client
-from services.client.records import Record, Records
-
-__all__ = ["Client", "Record", "Records"]

@@ -1,6 +1,0 @@
-"""The report of a build: one HTML file that needs nothing else."""
-
-from services.report.page import write_report
-from services.report.pictures import Picture, PictureSet
-
-__all__ = ["Picture", "PictureSet", "write_report"]

@@ -1,0 +1,1 @@
+"""One module for each stage of a build: what it makes and from what. `services.pipeline` orders them."""
