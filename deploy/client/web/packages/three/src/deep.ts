@@ -32,6 +32,7 @@ import type { Range } from "./range";
 import { alpha, colour, opticalDepth } from "./surface";
 import type { Tail } from "./tail";
 import { Filter, type Draw, over, summed, targetOf } from "./targets";
+import { forget } from "./upkeep";
 import type { Visible } from "./visible";
 
 const NAMES = ["words", "luma", "offsets", "cuts", "cursors", "pool"] as const;
@@ -161,6 +162,7 @@ export class Deep {
 
   dispose(): void {
     this.release();
+    forget(this.renderer, new Set([this.#gathered, this.#captured]));
     this.#encode.dispose();
     this.#over.dispose();
   }

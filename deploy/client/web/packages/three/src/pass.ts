@@ -15,6 +15,7 @@ import {
 } from "three/webgpu";
 import type { MRTNode } from "three/webgpu";
 import { isOurs, transmits } from "./surface";
+import { renewing } from "./upkeep";
 import { type Technique, Techniques } from "./techniques";
 
 export interface DiaphaneOptions {
@@ -112,12 +113,15 @@ export class DiaphanePassNode extends PassNode {
     this.#only(renderer, (_, material) => isOurs(material));
     Object.assign(renderer, { opaque: false, transparent: true, autoClear: true, autoClearColor: true });
     renderer.autoClearDepth = renderer.autoClearStencil = false;
+    const { contextNode } = renderer;
+    renderer.contextNode = renewing(renderer);
     techniques.render(this, (target: RenderTarget, outputs: MRTNode) => {
       renderer.setRenderTarget(target);
       renderer.setMRT(outputs);
       renderer.render(this.#scene, this.#view);
       renderer.setMRT(null);
     });
+    renderer.contextNode = contextNode;
     this.#view.layers.mask = mask;
     RendererUtils.restoreSceneState(this.#scene, scene);
     RendererUtils.restoreRendererState(renderer, state);

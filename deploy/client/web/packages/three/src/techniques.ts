@@ -10,6 +10,7 @@ import { Range } from "./range";
 import { Depth } from "./surface";
 import { Tail } from "./tail";
 import { type Draw, type Filter, over, summed } from "./targets";
+import { forget } from "./upkeep";
 import { Visible } from "./visible";
 
 /** Depth bins alone; the same number of slots for every pixel; those that a bundle's network gives it. */
@@ -144,6 +145,8 @@ export class Techniques {
   }
 
   dispose(): void {
+    const passes = [this.#binned, ...(this.#core ? [this.#core.passes] : [])];
+    forget(this.renderer, new Set([this.#range.mrt, ...passes.flatMap(({ bins, tail }) => [bins, tail])]));
     this.#range.dispose();
     this.#bins.target.dispose();
     this.#tail.target.dispose();

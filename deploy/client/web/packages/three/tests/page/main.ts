@@ -1,8 +1,9 @@
 // What tests call: `three.compare(...)` and its like.
 
-import { DataUtils, RenderPipeline, WebGPURenderer } from "three/webgpu";
+import { DataUtils, type RenderTarget, RenderPipeline, WebGPURenderer } from "three/webgpu";
 import { type Bundle, tailOf } from "@diaphane/core";
 import { type DiaphaneOptions, diaphanePass } from "../../src/index";
+import { count, type Held, held } from "./counters";
 import { peel, type Reference } from "./reference";
 import { SCENES, type Sample } from "./scenes";
 
@@ -12,6 +13,8 @@ const encode = (linear: number): number => {
   const x = Math.min(Math.max(linear, 0), 1);
   return 255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
 };
+
+count();
 
 async function start(forceWebGL: boolean): Promise<WebGPURenderer> {
   const renderer = new WebGPURenderer({ forceWebGL, antialias: false });
@@ -39,45 +42,62 @@ async function linear(renderer: WebGPURenderer, sample: Sample, options: Diaphan
   return (await drawnBy(renderer, sample, options)).picture;
 }
 
-/** The picture, rows from the top, and what `kbuffer-deep` gave its pixels. */
+/** Linear, three a pixel; rows from the top, of WebGL from the bottom. */
+async function read(renderer: WebGPURenderer, target: RenderTarget): Promise<Float64Array> {
+  const { width, height } = target;
+  const halves = await renderer.readRenderTargetPixelsAsync(target, 0, 0, width, height);
+  const made = new Float64Array(3 * width * height);
+  for (let i = 0; i < made.length; i++) made[i] = DataUtils.fromHalfFloat(halves[Math.floor(i / 3) * 4 + (i % 3)]!);
+  return made;
+}
+
+/** The picture, and what `kbuffer-deep` gave its pixels. */
 async function drawnBy(renderer: WebGPURenderer, sample: Sample, options: DiaphaneOptions) {
   const pass = diaphanePass(sample.scene, sample.camera, options);
   const pipeline = new RenderPipeline(renderer, pass);
   pipeline.render();
-  const halves = await renderer.readRenderTargetPixelsAsync(pass.renderTarget, 0, 0, WIDTH, HEIGHT);
-  const made = new Float64Array(3 * WIDTH * HEIGHT);
-  for (let i = 0; i < made.length; i++) made[i] = DataUtils.fromHalfFloat(halves[Math.floor(i / 3) * 4 + (i % 3)]!);
+  const picture = await read(renderer, pass.renderTarget);
   const slots = await pass.slots();
   pass.dispose();
   pipeline.dispose();
-  return { picture: made, budget: slots?.budget ?? 0, used: slots?.k.reduce((sum, k) => sum + k, 0) ?? 0 };
+  return { picture, budget: slots?.budget ?? 0, used: slots?.k.reduce((sum, k) => sum + k, 0) ?? 0 };
 }
 
-/** What the renderer holds after a pass was used, resized and given another budget, and disposed of; before, too. */
-async function life(renderer: WebGPURenderer): Promise<readonly (readonly number[])[]> {
-  const sample = SCENES["panes"]!();
-  const held = (): number[] => {
-    const { textures, renderTargets, storageAttributes } = renderer.info.memory as unknown as Record<string, number>;
-    return [textures!, renderTargets!, storageAttributes!];
-  };
-  await linear(renderer, sample, {});
-  const before = held();
-  const pass = diaphanePass(sample.scene, sample.camera, { budget: 2 });
+const deviceOf = (renderer: WebGPURenderer): GPUDevice => (renderer.backend as unknown as { device: GPUDevice }).device;
+
+/** Pictures in turns, with each of some options, by one pass; what the device holds after each, and after `dispose`. */
+async function life(renderer: WebGPURenderer, sample: Sample, turns: readonly DiaphaneOptions[]): Promise<Held[]> {
+  const found = [held()];
+  const pass = diaphanePass(sample.scene, sample.camera);
   const pipeline = new RenderPipeline(renderer, pass);
-  pipeline.render();
-  const during = held();
-  renderer.setSize(120, 90);
-  pass.budget = 5;
-  pipeline.render();
-  pass.budget = 0;
-  pipeline.render();
-  renderer.setSize(WIDTH, HEIGHT);
-  pass.budget = 2;
-  pipeline.render();
-  const again = held();
+  for (const { budget = 0, technique = "kbuffer", bundle = null } of turns) {
+    Object.assign(pass, { budget, technique, bundle });
+    pipeline.render();
+    await deviceOf(renderer).queue.onSubmittedWorkDone();
+    found.push(held());
+  }
   pass.dispose();
   pipeline.dispose();
-  return [before, during, again, held()];
+  return [...found, held()];
+}
+
+/** How far pictures of one pass are apart, of which the second is drawn after the device was lost. */
+async function lost(renderer: WebGPURenderer, sample: Sample, options: DiaphaneOptions): Promise<Agreement> {
+  const pass = diaphanePass(sample.scene, sample.camera, options);
+  const pictures: Float64Array[] = [];
+  let current = renderer;
+  for (const isLast of [false, true]) {
+    const pipeline = new RenderPipeline(current, pass);
+    pipeline.render();
+    pictures.push(await read(current, pass.renderTarget));
+    if (isLast) break;
+    const device = deviceOf(current);
+    device.destroy();
+    await device.lost;
+    current = await start(false);
+  }
+  pass.dispose();
+  return agreement(pictures[0]!, pictures[1]!);
 }
 
 /** A scene whose objects are drawn the other way round. */
@@ -110,6 +130,6 @@ function drawn(picture: Float64Array, title: string): void {
   document.body.append(canvas);
 }
 
-const three = { start, SCENES, life, reversed, linear, drawnBy, bundleOf, peel: (r: WebGPURenderer, s: Sample): Promise<Reference> => peel(r, s, WIDTH, HEIGHT), agreement, drawn };
+const three = { start, SCENES, life, lost, held, reversed, linear, drawnBy, bundleOf, peel: (r: WebGPURenderer, s: Sample): Promise<Reference> => peel(r, s, WIDTH, HEIGHT), agreement, drawn };
 Object.assign(globalThis, { three });
 export type Three = typeof three;
