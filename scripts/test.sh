@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Tests in lanes: processes of which two more run at a time than there are cores, because some of them mostly wait for
+# Tests in lanes: processes of which one more runs at a time than there are cores, because some of them mostly wait for
 # processes that they start and kill. A lane's words are shown when it has ended. The lanes that compute kernels begin,
 # and those that take the kernels from them (tests/support/kernels.py) come late.
 #   scripts/test.sh            everything, beside the linters
@@ -28,7 +28,7 @@ finish_one() {
 }
 
 lane() { # name, command...
-    [ "${#running[@]}" -lt "$((cores + 2))" ] || finish_one
+    [ "${#running[@]}" -le "$cores" ] || finish_one
     { time "${@:2}" > "$said/$1.out" 2>&1; } 2> "$said/$1.time" &
     running[$!]=$1
 }

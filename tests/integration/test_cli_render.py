@@ -22,7 +22,7 @@ from renderer.deep_exr import read_deep_exr
 from renderer.dump import read_dump
 from renderer.exr import read_exr
 from renderer.frame import Frame
-from renderer.techniques import TECHNIQUES, Budget, Entry, Needs, Rendered, bands
+from renderer.techniques import TECHNIQUES, Budget, Needs, Rendered, Technique, bands
 from schemas.colour import display8, linear_to_srgb, srgb_to_linear
 from schemas.limits import LIMITS
 from schemas.problem import ExitCode, Problem
@@ -153,15 +153,13 @@ def test_what_is_timed_is_not_the_first_frame(
 ) -> None:
     drawn: list[tuple[int, int]] = []
 
-    class Slow:
-        name = "moment"
-
+    class Slow(TECHNIQUES["moment"]):  # type: ignore[misc]
         def render(self, frame: Frame, budget: Budget) -> Rendered:
             drawn.append((frame.width, frame.height))
-            made = TECHNIQUES["sbuffer"].make(Needs()).render(frame, budget)
+            made = TECHNIQUES["sbuffer"].of(Needs()).render(frame, budget)
             return replace(made, passes={"first" if len(drawn) == 1 else "later": 1.0})
 
-    monkeypatch.setitem(cast(dict[str, Entry], TECHNIQUES), "moment", Entry("approximate", "slow", lambda _: Slow()))
+    monkeypatch.setitem(cast(dict[str, type[Technique]], TECHNIQUES), "moment", Slow)
     found = answer(capsys, "render", "panes.usda", "-t", "moment", "-w", "30", "--samples", "2")["pictures"]
     assert drawn == [(30, 20)] * 3
     assert found[0]["passes"] == {"later": 2.0}
@@ -274,15 +272,11 @@ def test_an_exact_technique_that_cannot_render_a_view_says_what_it_would_need(
 def test_what_exceeds_the_limits_is_left_out_among_others_and_a_problem_alone(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    class TooLarge:
-        name = "moment"
-
+    class TooLarge(TECHNIQUES["moment"]):  # type: ignore[misc]
         def render(self, frame: Frame, budget: Budget) -> Rendered:
             raise Problem("It needs 9 GiB.", "Ask for less.", ExitCode.LIMIT)
 
-    monkeypatch.setitem(
-        cast(dict[str, Entry], TECHNIQUES), "moment", Entry("approximate", "too large", lambda _: TooLarge())
-    )
+    monkeypatch.setitem(cast(dict[str, type[Technique]], TECHNIQUES), "moment", TooLarge)
     found = answer(capsys, "render", "panes.usda", "-t", "moment,sbuffer", "-w", "30")["pictures"]
     assert [picture["problem"] for picture in found] == ["It needs 9 GiB.", None]
     assert sorted(path.name for path in folder.glob("*.png")) == ["panes-sbuffer.png"]

@@ -82,7 +82,7 @@ def test_a_missing_driver_is_said_whichever_of_its_paths_was_asked_for(monkeypat
 
 def test_naming_the_suites_imports_none_of_what_they_need() -> None:
     heavy = "{'torch', 'onnx', 'onnxruntime', 'moderngl', 'numba', 'pxr'}"
-    code = f"import sys, stress.suites; sys.exit(bool({heavy} & set(sys.modules)))"
+    code = f"import sys, evaluation.stress.suites; sys.exit(bool({heavy} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -111,7 +111,7 @@ def test_which_files_are_missing(stored: Api) -> None:
 def test_an_empty_file_and_one_of_many_pieces(api: Api) -> None:
     blobs = api.service.storage.blobs
     large = os.urandom((5 << 20) + 7)
-    with api.served() as url, httpx.Client(headers=api.headers("read")) as client:
+    with api.served() as url, httpx.Client(headers=api.headers("read"), timeout=60.0) as client:
         for data in (b"", large):
             sha256 = blobs.put_bytes(data).sha256
             assert client.get(f"{url}/v1/blobs/sha256/{sha256}").content == data

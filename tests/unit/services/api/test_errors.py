@@ -110,7 +110,7 @@ def test_a_body_is_limited_with_and_without_its_length(api: Api) -> None:
             read += 1 << 16
             yield b" " * (1 << 16)
 
-    with api.served() as url, httpx.Client() as client:
+    with api.served() as url, httpx.Client(timeout=60.0) as client:
         headers = {**JSON, **api.headers()}
         try:
             answer = client.post(f"{url}/v1/jobs", content=endless(), headers=headers, timeout=10.0)

@@ -166,12 +166,12 @@ def test_a_body_that_nobody_waits_for_keeps_no_connection(api: Api, hasty: float
 
 def test_a_connection_is_used_again_and_a_long_answer_is_not_cut_off(api: Api, hasty: float) -> None:
     job = api.job()
-    with api.served() as url, httpx.Client(headers=api.headers("read")) as client:
+    with api.served() as url, httpx.Client(headers=api.headers("read"), timeout=60.0) as client:
         for _ in range(3):
             assert client.get(f"{url}/v1/jobs").status_code == 200
             time.sleep(0.1)
         stream = {"Accept": "text/event-stream"}
-        with client.stream("GET", f"{url}/v1/jobs/{job}/events", headers=stream, timeout=10.0) as answer:
+        with client.stream("GET", f"{url}/v1/jobs/{job}/events", headers=stream) as answer:
             lines = answer.iter_lines()
             next(lines)
             time.sleep(2.0 * hasty)

@@ -165,7 +165,7 @@ def test_what_is_no_secret_or_was_one_is_no_guess(tmp_path: Path) -> None:
 def test_who_asks_is_what_the_connection_says(tmp_path: Path) -> None:
     """`X-Forwarded-For` costs nothing to write: with another address each time nobody would ever be counted."""
     api = Api(tmp_path, rate=0.001, burst=8)
-    with api.served() as url, httpx.Client() as client:
+    with api.served() as url, httpx.Client(timeout=60.0) as client:
         statuses = [
             client.get(
                 f"{url}/v1/jobs", headers={"Authorization": f"Bearer {GUESS}", "X-Forwarded-For": f"203.0.113.{n}"}
@@ -177,7 +177,7 @@ def test_who_asks_is_what_the_connection_says(tmp_path: Path) -> None:
 
 def test_a_proxy_that_was_named_is_believed(tmp_path: Path) -> None:
     api = Api(tmp_path, rate=0.001, burst=8)
-    with api.served(proxies=("127.0.0.0/8",)) as url, httpx.Client() as client:
+    with api.served(proxies=("127.0.0.0/8",)) as url, httpx.Client(timeout=60.0) as client:
         statuses = [
             client.get(
                 f"{url}/v1/jobs",
