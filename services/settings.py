@@ -33,6 +33,7 @@ class Settings(BaseSettings):
         checks_per_key: Uploads of one key that all workers together check at once: less than their slots, so that one
             key cannot hold them all.
         check_seconds: Longest time of a check.
+        check_turn: Seconds after which a check makes room for others that wait, and begins again beside them.
         check_bytes: Memory that a check's process may use.
         task_seconds: Longest time of a task other than a training.
         train_seconds: Longest time of a training.
@@ -68,6 +69,7 @@ class Settings(BaseSettings):
     slots_check: int = Field(default=2, ge=1)
     checks_per_key: int = Field(default=1, ge=1)
     check_seconds: float = Field(default=30.0, gt=0.0)
+    check_turn: float = Field(default=4.0, gt=0.0)
     check_bytes: int = Field(default=2 << 30, ge=512 << 20)
     task_seconds: float = Field(default=1800.0, gt=0.0)
     train_seconds: float = Field(default=7 * 86400.0, gt=0.0)

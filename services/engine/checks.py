@@ -4,15 +4,20 @@ The waiting scenes of a key are its own queue, in the order in which they came. 
 among the workflows at once; the next one follows when one is done. So keys take turns, however many uploads each has
 waiting, and a key whose uploads take all the time that they may holds that many slots and no more.
 
+Several keys could hold all slots that way. So a check has a turn (`check_turn`): one that takes longer while others
+wait is ended, and begins again in a queue and a slot for long ones. Where nobody waits it simply goes on.
+
 A check's workflows have the ids check/KEY/SCENE/NUMBER.
 """
 
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import sqlalchemy as sa
+from sqlalchemy.exc import DBAPIError
 
 from schemas.problem import ExitCode, Problem
 from services.database import Database, tables
@@ -28,6 +33,42 @@ if TYPE_CHECKING:
 PAUSE_SECONDS = 5.0
 TRIES = 3
 MOST = 100
+LOOK_SECONDS = 0.5
+"""Between two looks at whether others wait, when a turn is over."""
+
+
+class TurnOver(Exception):
+    """A check has had its turn, and others wait."""
+
+
+class Turn:
+    """The time of a check while others wait.
+
+    Args:
+        database: That the checks are queued in.
+        seconds: How long it is.
+    """
+
+    def __init__(self, database: Database, seconds: float) -> None:
+        self._database, self._next, self._waited = database, time.monotonic() + seconds, False
+
+    def tick(self) -> None:
+        """Ends the check if its turn is over and others wait.
+
+        They are seen twice: what a free slot takes at the next poll does not wait.
+
+        Raises:
+            TurnOver: It ends.
+        """
+        if time.monotonic() < self._next:
+            return
+        self._next = time.monotonic() + LOOK_SECONDS
+        waits = False
+        with suppress(DBAPIError), self._database.read() as connection:
+            waits = connection.execute(system.waiting(self._database), {"queue": queues.CHECKS}).first() is not None
+        if waits and self._waited:
+            raise TurnOver
+        self._waited = waits
 
 
 def prefix_of(key: str, scene_id: str = "") -> str:
@@ -58,7 +99,24 @@ def queue_next(connection: sa.Connection, database: Database, client: DBOSClient
         tried = len(system.statuses(connection, database, prefix))
         if scene_id not in queued and tried < TRIES:
             name, free = f"{prefix}{tried}", free - 1
-            system.enqueue(client, connection, "check", name, queues.CHECKS, scene_id, priority=1)
+            system.enqueue(client, connection, "check", name, queues.CHECKS, scene_id, False, priority=1)
+
+
+def queue_long(connection: sa.Connection, database: Database, client: DBOSClient, ended: str) -> None:
+    """Queues a check again, among those that take longer than a turn; doing it again changes nothing.
+
+    Args:
+        connection: The caller's transaction.
+        database: The same database.
+        client: Queues workflows in it.
+        ended: Id of the workflow whose turn is over, and that still runs.
+    """
+    _, key, scene_id, _ = ended.split("/")
+    prefix = prefix_of(key, scene_id)
+    if set(system.live_ids(connection, database, prefix)) - {ended}:
+        return
+    name = f"{prefix}{len(system.statuses(connection, database, prefix))}"
+    system.enqueue(client, connection, "check", name, queues.LONG_CHECKS, scene_id, True, priority=1)
 
 
 def see_to_adrift(database: Database, jobs: Jobs) -> None:

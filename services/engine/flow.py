@@ -21,7 +21,7 @@ class Host(Protocol):
     def work(self, workflow_id: str, job_id: str, attempt: int, position: int, errors: int) -> None:
         """Does a task."""
 
-    def check(self, workflow_id: str, scene_id: str) -> None:
+    def check(self, workflow_id: str, scene_id: str, is_long: bool) -> None:
         """Checks a scene."""
 
 
@@ -58,6 +58,6 @@ def task(job_id: str, attempt: int, position: int, errors: int) -> None:
 
 
 @DBOS.workflow(name="check", max_recovery_attempts=LOST_EXECUTORS - 1)
-def check(scene_id: str) -> None:
+def check(scene_id: str, is_long: bool) -> None:
     """Checks an uploaded scene."""
-    _present().check(_id(), scene_id)
+    _present().check(_id(), scene_id, is_long)

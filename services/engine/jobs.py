@@ -26,6 +26,7 @@ from services.database.clock import clock
 from services.engine import checks, events, progress, queues, states, system
 from services.engine.events import Event
 from services.settings import Settings
+from stages.tasks import ROLES
 
 if TYPE_CHECKING:
     from dbos import DBOSClient
@@ -306,9 +307,11 @@ class Jobs:
                 counts[row.queue_name, row.status == "PENDING"] += row.number
             open_checks = sa.select(sa.func.count()).where(tables.scenes.c.state == "checking")
             # Most of them wait in the queues of their keys.
+            counts[queues.CHECKS, True] += counts[queues.LONG_CHECKS, True]
             waiting = int(connection.scalar(open_checks) or 0) - counts[queues.CHECKS, True]
         counts[queues.CHECKS, False] = max(0, waiting)
-        return [QueueRecord(role=q, queued=counts[q, False], running=counts[q, True]) for q in queues.QUEUES]
+        shown = (*ROLES, queues.CHECKS)
+        return [QueueRecord(role=q, queued=counts[q, False], running=counts[q, True]) for q in shown]
 
     def executors(self) -> builtins.list[ExecutorRecord]:
         """Processes that run work, and those that did lately."""
@@ -335,6 +338,10 @@ class Jobs:
                 checks.queue_next(connection, self._database, self.client, key, self._settings.checks_per_key)
 
         self._database.retry(body)
+
+    def check_longer(self, workflow_id: str) -> None:
+        """Queues a check whose turn is over among the long ones; see `services.engine.checks`."""
+        self._database.retry(lambda c: checks.queue_long(c, self._database, self.client, workflow_id))
 
     def _enqueue(self, connection: sa.Connection, job_id: str, attempt: int, spec: JobSpec) -> None:
         system.enqueue(

@@ -1,11 +1,12 @@
-"""A queue for each role and one for checks of uploads, and who is served first.
+"""A queue for each role and two for checks of uploads, and who is served first.
 
 Order within a queue is by class first (high, normal, low) and by start-time fair queueing within a class (Goyal, Vin
 and Cheng, 1996, with equal weights and tasks of equal cost): a job's first task gets the virtual time at which the
 queue is now, or that after the job's last one, and every further task one more. So jobs of one class take turns,
 however many tasks each has queued and whoever came first.
 
-Checks are queued one after the other for each key (`services.engine.checks`), so keys take turns.
+Checks are queued one after the other for each key (`services.engine.checks`), so keys take turns. One that takes longer
+than its turn while others wait goes on in a queue and a slot for such ones.
 """
 
 from __future__ import annotations
@@ -25,7 +26,12 @@ if TYPE_CHECKING:
 
 CHECKS: Final = "check"
 """Queue of checks: of the workers for the role `render`, who have USD."""
-QUEUES: Final = (*ROLES, CHECKS)
+LONG_CHECKS: Final = "check-long"
+"""Queue of checks that took longer than a turn."""
+QUEUES: Final = (*ROLES, CHECKS, LONG_CHECKS)
+
+LONG_SLOTS = 1
+"""Long checks that a worker runs at once, beside the others."""
 
 JOB_SLOTS = 32
 """Jobs that one process conducts at once; each is a thread that waits."""
@@ -44,7 +50,7 @@ def slots(settings: Settings, roles: tuple[Role, ...]) -> dict[str, int]:
         "train": settings.slots_train,
     }
     found: dict[str, int] = {role: children[role] for role in ROLES if role in roles}
-    return {**found, CHECKS: settings.slots_check} if "render" in roles else found
+    return {**found, CHECKS: settings.slots_check, LONG_CHECKS: LONG_SLOTS} if "render" in roles else found
 
 
 def register(client: DBOSClient, settings: Settings) -> None:

@@ -19,7 +19,7 @@ from services.clock import iso
 from services.database import Database, open_database
 from services.engine import checks, flow, queues, states, system
 from services.engine.child import resolve
-from services.engine.children import ChildOptions
+from services.engine.children import ChildOptions, Hooks
 from services.engine.claims import Claims
 from services.engine.housekeeping import Housekeeping
 from services.engine.jobs import Jobs
@@ -207,12 +207,16 @@ class Runtime:
         with self._claims.hold(workflow_id), structlog.contextvars.bound_contextvars(job_id=job_id):
             self._worker.do(claim, Place(job_id, attempt, position), errors)
 
-    def check(self, workflow_id: str, scene_id: str) -> None:
+    def check(self, workflow_id: str, scene_id: str, is_long: bool) -> None:
         """See `flow.Host`."""
         assert self._parts is not None
         claim = Claim(workflow_id, self.executor)
+        hooks = Hooks() if is_long else Hooks(tick=checks.Turn(self._database, self.settings.check_turn).tick)
         with self._claims.hold(workflow_id), structlog.contextvars.bound_contextvars(scene_id=scene_id):
-            self._worker.check(claim, scene_id, self._parts.scenes)
+            try:
+                self._worker.check(claim, scene_id, self._parts.scenes, hooks)
+            except checks.TurnOver:
+                self._jobs.check_longer(workflow_id)
             self._jobs.check_next(scene_id)
 
     def _see_to_adrift(self) -> None:

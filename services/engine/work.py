@@ -153,8 +153,14 @@ class Worker:
         else:
             self._tasks.end(claim, place, "done", note, reporter.events())
 
-    def check(self, claim: Claim, scene_id: str, scenes: Scenes) -> None:
+    def check(self, claim: Claim, scene_id: str, scenes: Scenes, hooks: Hooks) -> None:
         """Looks into an uploaded scene, in a process of its own that sees nothing else.
+
+        Args:
+            claim: Of the workflow.
+            scene_id: The scene.
+            scenes: All of them.
+            hooks: Told what happens; what they raise ends the check, and nothing is written down.
 
         Raises:
             Abandoned: The claim was lost.
@@ -174,7 +180,7 @@ class Worker:
             child = Child(options, self._spawner, f"check-{scene_id}")
             self._claims.on_loss(claim.workflow_id, child.lose)
             try:
-                answer = child.call(f"the check of {record.name}", request, seconds, Hooks(), assignment)
+                answer = child.call(f"the check of {record.name}", request, seconds, hooks, assignment)
             except Lost:
                 raise Abandoned(claim.workflow_id) from None
             except Problem as problem:

@@ -14,6 +14,8 @@ import pytest
 from support.postgres import Postgres
 from support.workers import Fleet, alive, until
 
+from services.engine import system
+
 ALL = ("jobs", "render", "label", "train")
 
 
@@ -234,6 +236,28 @@ def test_uploads_that_take_all_their_time_hold_up_neither_another_key_s_nor_a_ta
     assert fleet.wait(fleet.submit("a", _tasks("render", 1))).state == "succeeded"
     assert [fleet.checked(scene_id) for scene_id in slow] == ["checking"] * 3
     assert (fleet.jobs.queues()[-1].running, fleet.jobs.queues()[-1].queued) == (1, 2)
+
+
+def test_uploads_of_three_keys_that_take_all_their_time_make_room_for_a_fourth_key_s(sqlite_fleet: Fleet) -> None:
+    fleet = sqlite_fleet
+    fleet.worker(*ALL, CHECK_SECONDS="6", CHECK_TURN="1").ready()
+    slow = [fleet.send(f"key_{name}", f"slow {name}") for name in "abc"]
+    until(lambda: fleet.jobs.queues()[-1].running >= 2)
+    good = fleet.send("key_d", "good")
+    until(lambda: fleet.checked(good) == "accepted")
+    assert [fleet.checked(scene_id) for scene_id in slow] == ["checking"] * 3
+    until(lambda: [fleet.checked(scene_id) for scene_id in slow] == ["rejected"] * 3, 40.0)
+    assert fleet.jobs.queues()[-1].queued == fleet.jobs.queues()[-1].running == 0
+
+
+def test_a_check_goes_on_beyond_its_turn_where_nobody_waits(sqlite_fleet: Fleet) -> None:
+    fleet = sqlite_fleet
+    fleet.worker(*ALL, CHECK_SECONDS="3", CHECK_TURN="0.2").ready()
+    slow = [fleet.send(f"key_{name}", f"slow {name}") for name in "ab"]
+    until(lambda: [fleet.checked(scene_id) for scene_id in slow] == ["rejected"] * 2)
+    with fleet.database.read() as connection:
+        ids = system.statuses(connection, fleet.database, "check/")
+    assert {name.rpartition("/")[2] for name, _ in ids} == {"0"}, "each was begun once"
 
 
 def test_a_key_s_uploads_are_checked_one_after_the_other_by_the_clock(sqlite_fleet: Fleet) -> None:

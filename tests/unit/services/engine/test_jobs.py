@@ -191,6 +191,36 @@ def test_the_next_check_is_queued_while_the_workflow_of_the_last_one_still_ends(
     assert _queued_checks(fleet) == ["key_a/scn_0/0", "key_a/scn_1/0"]
 
 
+def test_a_check_whose_turn_is_over_is_queued_once_among_the_long_ones_and_stays_its_key_s_one(fleet: Fleet) -> None:
+    _sent(fleet, "key_a", "scn_0", "scn_1")
+    fleet.jobs.check_longer("check/key_a/scn_0/0")
+    fleet.jobs.check_longer("check/key_a/scn_0/0")
+    table = system.workflows(fleet.database)
+    ended = table.update().where(table.c.workflow_uuid == "check/key_a/scn_0/0").values(status="SUCCESS")
+    with fleet.database.write() as connection:
+        connection.execute(ended)
+    fleet.jobs.check_next("scn_0")
+    with fleet.database.read() as connection:
+        rows = connection.execute(sa.select(table.c.workflow_uuid, table.c.queue_name, table.c.status)).all()
+    assert sorted(map(tuple, rows)) == [
+        ("check/key_a/scn_0/0", "check", "SUCCESS"),
+        ("check/key_a/scn_0/1", "check-long", "ENQUEUED"),
+    ]
+
+
+def test_a_check_s_turn_ends_when_others_wait_and_not_before(fleet: Fleet, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(checks, "LOOK_SECONDS", 0.0)
+    patient, over = checks.Turn(fleet.database, 600.0), checks.Turn(fleet.database, 0.0)
+    for _ in range(3):
+        over.tick()
+    _sent(fleet, "key_a", "scn_0")
+    over.tick()
+    for _ in range(3):
+        patient.tick()
+    with pytest.raises(checks.TurnOver):
+        over.tick()
+
+
 def test_a_scene_that_takes_its_checkers_with_it_is_rejected_and_the_next_one_is_checked(fleet: Fleet) -> None:
     _sent(fleet, "key_a", "scn_0", "scn_1")
     for _ in range(checks.TRIES):

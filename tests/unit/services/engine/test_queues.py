@@ -67,4 +67,4 @@ def test_an_empty_queue_begins_again(fleet: Fleet) -> None:
 def test_a_process_has_the_slots_of_its_roles() -> None:
     settings = Settings(slots_render=3, slots_label=2)
     assert queues.slots(settings, ("label", "jobs")) == {"jobs": queues.JOB_SLOTS, "label": 2}
-    assert queues.slots(settings, ("render",)) == {"render": 3, "check": 2}
+    assert queues.slots(settings, ("render",)) == {"render": 3, "check": 2, "check-long": 1}
