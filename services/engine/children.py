@@ -12,6 +12,7 @@ import os
 import queue
 import re
 import signal
+import site
 import socket
 import subprocess
 import sys
@@ -40,6 +41,8 @@ LINE_BYTES = 2000
 _SECRET = re.compile(r"^(DIAPHANE_|AWS_|PG|DBOS|KUBERNETES_)|SECRET|TOKEN|PASSWORD|PASSWD|CREDENTIAL|_KEY$|_DSN$")
 _SEARCHED = re.compile(r"^PXR_(?!WORK_THREAD_LIMIT$)|_SEARCH_PATH$")
 """Variables that name folders in which USD and MaterialX would look for what a scene names."""
+_HOMES = ("HOME", "TMPDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "MPLCONFIGDIR")
+"""Variables that name folders in which libraries keep what they like."""
 
 log = structlog.get_logger(__name__)
 
@@ -352,7 +355,9 @@ class Child:
         count = str(self._options.threads)
         pools = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "LP_NUM_THREADS")
         kept |= {name: os.environ.get(name, count) for name in pools}
-        kept |= dict.fromkeys(("TMPDIR", "XDG_CACHE_HOME", "MPLCONFIGDIR"), str(self.room.tmp))
+        # A picture must not depend on what the worker's user has configured for drivers and libraries at home.
+        kept["PYTHONUSERBASE"] = site.getuserbase()
+        kept |= dict.fromkeys(_HOMES, str(self.room.tmp))
         kept["NUMBA_CACHE_DIR"] = str(self._kernels)
         return {**kept, "PYTHONUNBUFFERED": "1", "PYTHONPATH": os.pathsep.join([_ROOT, *_paths(kept)])}
 

@@ -1,8 +1,8 @@
 """Runs a whole service whose children are traced: `audit.py FOLDER`, in a folder with files that nobody may open.
 
 FOLDER/scenes/NAME/ are uploads with the root scene.usda, by two keys, and FOLDER/victim.png is a file of a third one.
-Every scene is checked, then all of them are rendered. What every child opened comes into FOLDER/opened.PID.log, and
-what became of scenes and job into FOLDER/done.json.
+Every scene is checked, then all of them are rendered. What each thread of a child asked for comes into
+FOLDER/asked.CHILD.THREAD, and what became of scenes and job into FOLDER/done.json.
 """
 
 from __future__ import annotations
@@ -19,14 +19,17 @@ from services.service import open_service
 from services.settings import Settings
 
 PATIENCE_SECONDS = 240.0
+TRACED = "%file,socket,connect,bind"
+"""Every call that names a file, and those that make or use a way to other processes."""
 
 
 def _traced(folder: Path) -> str:
     """A program that runs Python under strace; the tracer is nobody's parent, and outlives a child that is killed."""
     script = folder / "traced-python"
-    words = ["strace", "-DDD", "-f", "--seccomp-bpf", "-qq", "-y", "-e", "trace=open,openat,openat2,execve"]
-    log = shlex.quote(str(folder / "opened"))
-    script.write_text(f'#!/bin/sh\nexec {shlex.join(words)} -o {log}.$$.log {shlex.quote(sys.executable)} "$@"\n')
+    # A log for each thread, as two threads in one log cut each other's lines; `exit` is not quiet: it ends a whole log.
+    words = ["strace", "-DDD", "-ff", "--seccomp-bpf", "--quiet=attach,personality", "-y", "-e", f"trace={TRACED}"]
+    log = shlex.quote(str(folder / "asked"))
+    script.write_text(f'#!/bin/sh\nexec {shlex.join(words)} -o {log}.$$ {shlex.quote(sys.executable)} "$@"\n')
     script.chmod(0o755)
     return str(script)
 

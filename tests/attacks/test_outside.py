@@ -1,4 +1,4 @@
-"""What the processes that meet uploads open, seen from the outside: nothing but their room, and what libraries need."""
+"""What the processes that meet uploads ask for, seen from the outside: their room, and what libraries need."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ import re
 import shutil
 import subprocess
 import sys
+import time
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 from attacks import make
+from attacks.calls import ENDED, Call, read_calls
 
 from services.sandbox import DEVICES, OWN_PACKAGES, SYSTEM
 
@@ -22,11 +25,20 @@ HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 CANARY = "canary"
 PROJECT = (*(str(ROOT / name) for name in OWN_PACKAGES), str(ROOT / "deploy"))
-MACHINE = (*SYSTEM, *DEVICES, "/proc", "/sys", "/etc/locale.alias", "/etc/ssl/openssl.cnf")
+PYTHON = (sys.prefix, sys.base_prefix, str(Path(sys.executable).resolve().parent))
+MACHINE = (*SYSTEM, *DEVICES, "/proc", "/sys", "/etc/locale.alias", "/etc/ssl/openssl.cnf", "/sbin/ldconfig")
+"""What the interpreter and libraries read of the machine, before a process is shut in as well."""
 LISTED = {"/dev", str(ROOT), str(ROOT / "tests")}
 """Folders whose names are read: for devices, and for modules in the entries of PYTHONPATH."""
-"""What the interpreter and libraries read of the machine, before a process is shut in as well."""
-OPENED = re.compile(r"\b(?:open|openat|openat2)\(.*\) = \d+<(?P<path>.*)>$")
+PROBED = re.compile(
+    rf"/selinux|/etc/ld\.so\.preload|/etc/zarr|.*/lib/python{sys.version_info.major}{sys.version_info.minor}\.zip"
+    r"|/dev/shm/sem\.\w+"
+)
+"""What libraries try on every machine: the loader, a format of arrays, the interpreter above its own folder, and a
+semaphore, which Python does without."""
+LOOKS = {"stat", "lstat", "newfstatat", "statx", "readlink", "readlinkat"}
+"""Calls that tell that something is there, and not what is in it."""
+PATIENCE_SECONDS = 30.0
 
 TEXTURE = """
 def Material "NAME" {
@@ -100,12 +112,33 @@ def _layers() -> dict[str, str]:
 
 
 @dataclass(frozen=True)
+class Watched:
+    """What one child asked for.
+
+    Attributes:
+        room: Its room.
+        calls: Of all its threads.
+    """
+
+    room: str
+    calls: list[Call]
+
+
+@dataclass(frozen=True)
 class Audited:
-    """What a service did, and what its children opened."""
+    """What a service did, and its children.
+
+    Attributes:
+        folder: Where it ran.
+        done: What became of scenes and job.
+        children: Its children.
+        stolen: Hash of the file that an upload asks for by its place in the store.
+    """
 
     folder: Path
     done: dict[str, Any]
-    logs: dict[str, list[str]]
+    children: list[Watched]
+    stolen: str
 
 
 @pytest.fixture(scope="module")
@@ -136,8 +169,25 @@ def audited(tmp_path_factory: pytest.TempPathFactory) -> Audited:
     command = [sys.executable, str(HERE / "audit.py"), str(folder)]
     finished = subprocess.run(command, cwd=server, env=environment, capture_output=True, text=True)
     assert finished.returncode == 0, finished.stdout + finished.stderr
-    logs = {log.name: log.read_text(errors="replace").splitlines() for log in folder.glob("opened.*.log")}
-    return Audited(folder, json.loads((folder / "done.json").read_text()), logs)
+    return Audited(folder, json.loads((folder / "done.json").read_text()), list(_children(folder)), digest)
+
+
+def _children(folder: Path) -> Iterator[Watched]:
+    """What the logs have of each child, once all of them are whole: a tracer ends after what it traces."""
+    end = time.monotonic() + PATIENCE_SECONDS
+    logs: dict[Path, list[str]] = {}
+    while not logs or not all(lines and ENDED.fullmatch(lines[-1]) for lines in logs.values()):
+        assert time.monotonic() < end, [log.name for log, lines in logs.items() if not ENDED.fullmatch(lines[-1])]
+        time.sleep(0.1)
+        logs = {log: log.read_text(errors="replace").splitlines() for log in folder.glob("asked.*.*")}
+    for child in sorted({log.name.split(".")[1] for log in logs}):
+        calls = [call for log, lines in logs.items() if log.name.split(".")[1] == child for call in read_calls(lines)]
+        (room,) = {found[1] for call in calls if (found := re.search(r"AT_FDCWD<([^>]*)/empty>", call.text))}
+        yield Watched(room, calls)
+
+
+def _is_within(path: str, *folders: str) -> bool:
+    return any(path == folder or path.startswith(f"{folder}/") for folder in folders)
 
 
 def test_every_kind_of_process_was_watched(audited: Audited) -> None:
@@ -146,32 +196,49 @@ def test_every_kind_of_process_was_watched(audited: Audited) -> None:
     assert set(audited.done["tasks"].values()) == {"done"}
     stages = {name.split()[0] for name in audited.done["tasks"]}
     assert stages == {"scene", "render"}
-    assert len(audited.logs) >= 2 * len(audited.done["scenes"]), "a process for each check, and one for each scene"
+    rooms = [Path(child.room).name.split("-")[0] for child in audited.children]
+    assert rooms.count("check") == len(audited.done["scenes"]), "a process for each check"
+    assert rooms.count("render") >= len(audited.done["scenes"]), "and one for each scene"
+    for child in audited.children:
+        own = [call for call in child.calls if any(_is_within(path, f"{child.room}/sources") for path in call.paths)]
+        assert any(call.name.startswith("open") and call.done for call in own), "the log has what it should have"
 
 
-def test_no_process_opens_anything_outside_of_its_room(audited: Audited) -> None:
-    """Also by name: whatever USD would have found in the folder that the service was started in is not asked for."""
-    python = (sys.prefix, sys.base_prefix, str(Path(sys.executable).resolve().parent), *PROJECT)
-    state = f"{audited.folder}/server/.diaphane"
-    work = (f"{state}/work/", f"{state}/checkpoints/")
+def test_no_process_asks_for_anything_outside_of_its_room(audited: Audited) -> None:
+    """What is refused was still asked for. What leads to its room may be looked at, and not be listed or opened."""
+    key = f"{audited.folder}/server/.diaphane/work/kernels/{audited.done['job']['submitted_by']}"
     outside = []
-    for name, lines in audited.logs.items():
-        for line in lines:
-            found = OPENED.search(line)
-            path = found["path"] if found else ""
-            if CANARY in path or (path and path not in LISTED and not path.startswith((*python, *MACHINE, *work))):
-                outside.append(f"{name}: {line}")
+    for child in audited.children:
+        own = (child.room, key) if Path(child.room).name.startswith("render") else (child.room,)
+        inside = (*PYTHON, *PROJECT, *MACHINE, *own)
+        above = {str(parent) for folder in inside for parent in Path(folder).parents}
+        for call in child.calls:
+            here = [path for path in call.paths if path not in LISTED and not PROBED.fullmatch(path)]
+            here = [path for path in here if not _is_within(path, *inside)]
+            if call.name not in LOOKS or not all(path in above for path in here):
+                outside += [call.text] * bool(here)
+            if call.name in ("socket", "connect", "bind"):
+                outside.append(call.text)
     assert outside == []
-    assert any(work[0] in line for lines in audited.logs.values() for line in lines), "the log has what it should have"
 
 
-def test_no_process_opens_another_one_s_room_or_the_input_of_another_task(audited: Audited) -> None:
-    work = re.compile(rf"{re.escape(str(audited.folder))}/server/\.diaphane/work/\d[^/]+/(?P<room>[^/]+)/")
-    for name, lines in audited.logs.items():
-        rooms = {found["room"] for line in lines if (found := work.search(line)) and "= -1" not in line}
-        sources = {found for line in lines for found in re.findall(r"/sources/([0-9a-f]{64})", line)}
-        assert len(rooms) <= 1, name
-        assert len(sources) <= 1, name
+def test_what_lies_where_the_service_was_started_is_asked_for_in_the_upload_only(audited: Audited) -> None:
+    """By its words, wherever they stand in a line. USD looks for a name in the upload, then in the empty folder."""
+    asked = []
+    for child in audited.children:
+        own = (f"{child.room}/sources", f"{child.room}/empty")
+        for call in child.calls:
+            if any(word in call.text for word in (CANARY, audited.stolen, "victim")):
+                asked.append(call)
+                assert call.paths, call.text
+                assert all(_is_within(path, *own) for path in call.paths), call.text
+    assert asked, "the uploads ask for them"
+
+
+def test_no_process_asks_for_the_input_of_another_task(audited: Audited) -> None:
+    for child in audited.children:
+        sources = {found for call in child.calls for found in re.findall(r"/sources/([0-9a-f]{64})", call.text)}
+        assert len(sources) == 1, child.room
 
 
 def test_check_and_job_agree_on_what_is_missing(audited: Audited) -> None:

@@ -127,6 +127,7 @@ def test_a_child_has_no_secret_in_its_environment_and_ends_with_its_worker(child
     environment = Path(f"/proc/{pid}/environ").read_bytes()
     assert b"hunter2" not in environment
     assert b"NUMBA_NUM_THREADS=1" in environment
+    assert f"\0HOME={child.room.tmp}\0".encode() in environment
     channel = child._channel
     assert channel is not None
     channel.close()
