@@ -6,7 +6,7 @@ ARGS ?=
 # The scenes that the result is judged by, and that are never trained on.
 HOLDOUT ?= bottles foliage
 
-.PHONY: help setup setup-tests peers quickstart bench bench-gpu check test lint format docs lock clean
+.PHONY: help clients setup setup-tests peers quickstart bench bench-gpu check test lint format docs lock clean
 
 help: ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -49,6 +49,9 @@ format: setup ## rewrite the sources in the house style
 
 docs: ## the documents as a site, with the Python reference: build/site/index.html
 	@scripts/docs.sh
+
+clients: ## what the service has of deploy/client/web: demo, examples, and packages for npm (needs node)
+	cd deploy/client/web && npm ci --ignore-scripts --no-audit --no-fund && npm run build
 
 lock: ## all locks anew from pyproject.toml (with the uv of .venv, if there is no other)
 	scripts/lock.sh

@@ -8,8 +8,10 @@ from fastapi import APIRouter, Depends, FastAPI
 
 from services.dashboard import (
     assets,
+    clients,
     compare,
     demo,
+    examples,
     jobs,
     models,
     overview,
@@ -39,7 +41,13 @@ PAGES: tuple[APIRouter, ...] = (
 SESSION_ANSWERS: tuple[APIRouter, ...] = (demo.router,)
 """What scripts ask for with a session; refusals are problem documents."""
 
-OPEN_PAGES: tuple[APIRouter, ...] = (sign_in.router, assets.router, demo.open_router)
+OPEN_PAGES: tuple[APIRouter, ...] = (
+    sign_in.router,
+    assets.router,
+    demo.open_router,
+    clients.router,
+    examples.router,
+)
 """Those that do not."""
 
 

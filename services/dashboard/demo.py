@@ -6,9 +6,6 @@ script can read; so the page never has a key. The same functions answer as under
 
 from __future__ import annotations
 
-import hashlib
-from functools import cache
-from pathlib import Path
 from typing import Annotated, Final
 
 from fastapi import APIRouter, Depends, Request, Response
@@ -16,41 +13,22 @@ from fastapi import Path as InPath
 from fastapi.responses import JSONResponse
 
 from services.api import blobs, models
-from services.api.etags import is_current
 from services.api.parameters import require_known
+from services.dashboard.built import CHECKED, FOREVER, Built
 from services.dashboard.page import HEADERS
 from services.dashboard.visitor import COOKIE
-from services.problems import Refusal
 
-BUILT: Final = Path(__file__).resolve().parent / "static" / "demo"
-"""What `npm run build` in `deploy/client/web` writes."""
+BUILT: Final = Built("demo")
 
 open_router = APIRouter(prefix="/demo", include_in_schema=False)
 router = APIRouter(prefix="/demo/v1", include_in_schema=False, dependencies=[Depends(require_known)])
 """For scripts, by session: who has none is refused by a problem document, not sent to sign in."""
 
-_PAGE: Final = "index.html"
-_TYPES: Final = {
-    ".html": "text/html",
-    ".js": "text/javascript",
-    ".css": "text/css",
-    ".svg": "image/svg+xml",
-    ".glb": "model/gltf-binary",
-    ".md": "text/plain",
-}
-
-
-@cache
-def _files() -> dict[str, tuple[bytes, str]]:
-    """Path in the build -> content, and its hex sha256."""
-    found = {path.relative_to(BUILT).as_posix(): path.read_bytes() for path in BUILT.rglob("*") if path.is_file()}
-    return {name: (content, hashlib.sha256(content).hexdigest()) for name, content in found.items()}
-
 
 @open_router.get("", response_class=Response)
 async def show_demo(request: Request) -> Response:
     """The page."""
-    return _answer(request, _PAGE, {**HEADERS, "Cache-Control": "no-cache"})
+    return BUILT.answer(request, "index.html", {**HEADERS, **CHECKED})
 
 
 @open_router.get("/assets/{name}", response_class=Response)
@@ -58,13 +36,13 @@ async def read_demo_asset(
     name: Annotated[str, InPath(pattern=r"^[A-Za-z0-9_.-]{1,80}$")], request: Request
 ) -> Response:
     """A script, style or sample; its name changes with its content."""
-    return _answer(request, f"assets/{name}", {"Cache-Control": "public, max-age=31536000, immutable"})
+    return BUILT.answer(request, f"assets/{name}", FOREVER)
 
 
 @open_router.get("/licences.md", response_class=Response)
 async def read_demo_licences(request: Request) -> Response:
     """Of what the script contains of others."""
-    return _answer(request, "licences.md", {"Cache-Control": "no-cache"})
+    return BUILT.answer(request, "licences.md", CHECKED)
 
 
 @open_router.get("/session", response_class=JSONResponse)
@@ -74,16 +52,6 @@ async def show_session(request: Request) -> JSONResponse:
     The session may have ended: then the registry refuses. So this needs no look at the database.
     """
     return JSONResponse({"signed_in": bool(request.cookies.get(COOKIE))}, headers={"Cache-Control": "no-store"})
-
-
-def _answer(request: Request, name: str, headers: dict[str, str]) -> Response:
-    if name not in _files():
-        raise Refusal("not-found")
-    content, tag = _files()[name]
-    headers = {**headers, "ETag": f'"{tag}"'}
-    if is_current(request, tag):
-        return Response(status_code=304, headers=headers)
-    return Response(content, media_type=_TYPES[Path(name).suffix], headers=headers)
 
 
 router.add_api_route("/models", models.list_models)

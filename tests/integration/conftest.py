@@ -5,9 +5,11 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from support.api import Api
+from support.browser import CHROMIUM, WEBGPU, browser
 from support.dashboard import Shown, fill
 from support.web import install
 
@@ -43,3 +45,18 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     root = tmp_path_factory.mktemp("web")
     yield install(root)
     shutil.rmtree(root)
+
+
+@pytest.fixture(scope="module")
+def webgpu(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A browser with WebGPU."""
+    pytest.importorskip("playwright.sync_api")
+    if CHROMIUM is None:
+        pytest.skip("chromium is not installed")
+    with browser(tmp_path_factory.mktemp("browser"), WEBGPU) as started:
+        page = started.new_page()
+        page.goto("chrome://version")
+        if not page.evaluate("!!navigator.gpu && navigator.gpu.requestAdapter().then(Boolean)"):
+            pytest.skip("this chromium has no WebGPU adapter")
+        page.close()
+        yield started

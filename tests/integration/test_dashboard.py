@@ -41,6 +41,7 @@ PARTS = {
     "webhook_id": "whk_" + "0" * 24,
 }
 PLACES = [(method, route.path.format_map(PARTS)) for route in routes(PAGES) for method in sorted(route.methods or ())]
+EXAMPLES = ("/examples", "/examples/", "/examples/{name}", "/examples/assets/{name}")
 LISTS = ("/", "/jobs", "/models", "/scenes")
 
 
@@ -59,7 +60,8 @@ def test_every_route_of_the_application_is_known(api: Api) -> None:
     every = (*GUARDED, *OPEN, *PAGES, *SESSION_ANSWERS, *OPEN_PAGES)
     named = {(route.path, name) for route in routes(every) for name in route.methods}
     demo = {"/demo", "/demo/assets/{name}", "/demo/licences.md", "/demo/session"}
-    assert {route.path for route in routes(OPEN_PAGES)} == {"/sign-in", "/static/{digest}/{name}", *demo}
+    web = {"/clients", "/clients/", "/clients/{name}", *EXAMPLES}
+    assert {route.path for route in routes(OPEN_PAGES)} == {"/sign-in", "/static/{digest}/{name}", *demo, *web}
     assert api.app.state.routers == every
     assert [route for route in api.app.routes if isinstance(route, APIRoute)] == []
     assert len(named) == sum(len(route.methods or ()) for route in routes(api.app.state.routers))

@@ -14,7 +14,7 @@ import trimesh
 from numpy.typing import NDArray
 from PIL import Image
 from support.api import Api
-from support.browser import CHROMIUM, WEBGPU, Tab, browser
+from support.browser import Tab
 from support.dashboard import Visitor
 from support.training import random_weights
 
@@ -83,21 +83,6 @@ def api(bundles: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> A
         made.service.registry.publish(name, folder, 0.5, {"views": 2})
     made.service.registry.promote("glass", "1.0.0", "It is first.", who="key_000000000000")
     return made
-
-
-@pytest.fixture(scope="module")
-def webgpu(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """A browser with WebGPU."""
-    pytest.importorskip("playwright.sync_api")
-    if CHROMIUM is None:
-        pytest.skip("chromium is not installed")
-    with browser(tmp_path_factory.mktemp("browser"), WEBGPU) as started:
-        page = started.new_page()
-        page.goto("chrome://version")
-        if not page.evaluate("!!navigator.gpu && navigator.gpu.requestAdapter().then(Boolean)"):
-            pytest.skip("this chromium has no WebGPU adapter")
-        page.close()
-        yield started
 
 
 @pytest.fixture(scope="module")
@@ -494,7 +479,7 @@ def test_the_page_is_open_and_strict(api: Api) -> None:
     assert Visitor(api, None).get("/demo", **{"If-None-Match": answer.headers["etag"]}).status_code == 304
     for name in ("../index.html", "%2e%2e%2findex.html", "none.js", "..%2f..%2fdashboard.css"):
         assert Visitor(api, None).get(f"/demo/assets/{name}").status_code == 404
-    for path in (demo.BUILT / "assets").iterdir():
+    for path in (demo.BUILT.folder / "assets").iterdir():
         asset = Visitor(api, None).get(f"/demo/assets/{path.name}")
         assert asset.content == path.read_bytes()
         assert "immutable" in asset.headers["cache-control"]
@@ -525,4 +510,4 @@ def test_the_registry_answers_to_a_session_as_to_a_key(api: Api) -> None:
 
 
 def test_the_build_is_small() -> None:
-    assert sum(path.stat().st_size for path in demo.BUILT.rglob("*") if path.is_file()) < 300_000
+    assert sum(path.stat().st_size for path in demo.BUILT.folder.rglob("*") if path.is_file()) < 300_000

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from support.browser import CHROMIUM, WEBGPU, Tab, browser
+from support.browser import Tab
 from support.web import ROOT, run
 
 BUNDLE = ROOT / "benchmarks/bundle"
@@ -23,11 +23,8 @@ class _Quiet(http.server.SimpleHTTPRequestHandler):
 
 
 @pytest.fixture(scope="module")
-def page(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
+def page(webgpu: Any, installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
     """The package's page of tests, in a browser with WebGPU."""
-    pytest.importorskip("playwright.sync_api")
-    if CHROMIUM is None:
-        pytest.skip("chromium is not installed")
     built = tmp_path_factory.mktemp("three")
     done = run(
         installed, "npx", "vite", "build", "-c", "packages/three/tests/page/vite.config.ts", "--outDir", str(built)
@@ -35,13 +32,10 @@ def page(installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(_Quiet, directory=built)) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
-        with browser(tmp_path_factory.mktemp("browser"), WEBGPU) as started:
-            opened = Tab(started, f"http://127.0.0.1:{server.server_port}", 1000, "light")
-            opened.page.goto("/")
-            if not opened.page.evaluate("!!navigator.gpu && navigator.gpu.requestAdapter().then(Boolean)"):
-                pytest.skip("this chromium has no WebGPU adapter")
-            opened.until("!!globalThis.three")
-            yield opened
+        opened = Tab(webgpu, f"http://127.0.0.1:{server.server_port}", 1000, "light")
+        opened.page.goto("/")
+        opened.until("!!globalThis.three")
+        yield opened
         server.shutdown()
 
 

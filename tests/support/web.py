@@ -10,6 +10,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 WEB = ROOT / "deploy/client/web"
+BESIDE = ("LICENSE", "benchmarks/bundle/manifest.json", "benchmarks/bundle/predict.wgsl")
+"""What its build reads elsewhere in the repository."""
 OFFLINE = ("ENOTFOUND", "EAI_AGAIN", "ECONNREFUSED", "ECONNRESET", "ETIMEDOUT")
 
 
@@ -27,7 +29,10 @@ def install(root: Path) -> Path:
     if shutil.which("npm") is None:
         pytest.skip("npm is not installed")
     copy = root / "deploy/client/web"
-    shutil.copytree(WEB, copy, ignore=shutil.ignore_patterns("node_modules"))
+    shutil.copytree(WEB, copy, ignore=shutil.ignore_patterns("node_modules", "dist"))
+    for name in BESIDE:
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, root / name)
     done = run(copy, "npm", "ci", "--ignore-scripts", "--no-audit", "--no-fund", "--prefer-offline")
     if done.returncode and any(sign in done.stderr for sign in OFFLINE):
         pytest.skip("the packages cannot be fetched: there is no network")

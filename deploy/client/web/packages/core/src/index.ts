@@ -13,6 +13,7 @@ export { type Choice, type Memory, Registry, SignedOut } from "./registry";
 export { type Counted, Renderer, TECHNIQUES, type Technique } from "./renderer";
 export { type Batch, type Image, type Layer, type Scene, encodeGamma2, orient } from "./scene";
 export { shader } from "./shaders";
+export { shippedBundle } from "./shipped";
 export { DEFAULT_TAIL, FINEST_TAIL, type Tail, tailOf } from "./tail";
 export { Trouble } from "./trouble";
 export { Abandoned, Work } from "./work";

@@ -2,6 +2,8 @@ import { afterEach, beforeEach, describe, expect, it, vi } from "vitest";
 
 import { parseManifest } from "../src/manifest";
 import { Registry, SignedOut } from "../src/registry";
+import { sha256 } from "../src/release";
+import { shippedBundle } from "../src/shipped";
 import { Key, Memory, Service, manifestOf } from "./published";
 
 let service: Service;
@@ -290,4 +292,14 @@ it("models are not asked for where nobody is signed in", async () => {
   service.isSignedIn = false;
   await expect(registry.choices()).rejects.toThrow(SignedOut);
   expect(service.asked).toEqual(["/demo/session"]);
+});
+
+it("a bundle among an application's own files is taken if they belong together", async () => {
+  const wgsl = "fn of predict.wgsl";
+  const content = new TextEncoder().encode(wgsl);
+  const files = { "predict.wgsl": { sha256: await sha256(content), bytes: content.length } };
+  const manifest = JSON.stringify(manifestOf(files));
+  expect(await shippedBundle(manifest, wgsl)).toMatchObject({ name: "glass", wgsl, tail: { bins: 16 } });
+  await expect(shippedBundle(manifest, `${wgsl} `)).rejects.toThrow("predict.wgsl has another hash");
+  await expect(shippedBundle("{}", wgsl)).rejects.toThrow("its format");
 });
