@@ -176,8 +176,10 @@ class Worker:
         assignment = Assignment(subject=source.digest, sources={source.digest: folder})
         options = replace(self._options, memory_bytes=self._settings.check_bytes)
         seconds = self._settings.check_seconds
+        # One whose worker died at the end of its turn may run again beside the longer one that it queued.
+        name = f"check-{scene_id}-{claim.workflow_id.rpartition('/')[2]}"
         for left in reversed(range(CHECK_TRIES)):
-            child = Child(options, self._spawner, f"check-{scene_id}")
+            child = Child(options, self._spawner, name)
             self._claims.on_loss(claim.workflow_id, child.lose)
             try:
                 answer = child.call(f"the check of {record.name}", request, seconds, hooks, assignment)

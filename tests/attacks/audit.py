@@ -1,7 +1,7 @@
 """Runs a whole service whose children are traced: `audit.py FOLDER`, in a folder with files that nobody may open.
 
 FOLDER/scenes/NAME/ are uploads with the root scene.usda, by two keys, and FOLDER/victim.png is a file of a third one.
-Every scene is checked, then all of them are rendered. What each thread of a child asked for comes into
+Every scene is checked, then those that were accepted are rendered. What each thread of a child asked for comes into
 FOLDER/asked.CHILD.THREAD, and what became of scenes and job into FOLDER/done.json.
 """
 
@@ -43,21 +43,22 @@ def main() -> None:
     service.storage.blobs.put_bytes((folder / "victim.png").read_bytes())
     runtime = Runtime(settings)
     runtime.start()
-    uses = []
+    ids = []
     for number, home in enumerate(sorted((folder / "scenes").iterdir())):
         files = {path.relative_to(home).as_posix(): path for path in sorted(home.rglob("*")) if path.is_file()}
         hashes = {name: service.storage.blobs.put_bytes(path.read_bytes()).sha256 for name, path in files.items()}
         record, _ = service.scenes.create(home.name, "scene.usda", hashes, f"key_{number % 2}")
-        uses.append(SceneUse(scene=record.id))
+        ids.append(record.id)
     end = time.monotonic() + PATIENCE_SECONDS
 
     def checked() -> bool:
-        return all(service.scenes.get(use.scene).state != "checking" for use in uses)
+        return all(service.scenes.get(scene_id).state != "checking" for scene_id in ids)
 
     while not checked() and time.monotonic() < end:
         time.sleep(0.1)
-    records = [service.scenes.get(use.scene) for use in uses]
-    spec = JobSpec(kind="render", scenes=tuple(uses), views_per_scene=1, width=64, height=48, alpha=0.5)
+    records = [service.scenes.get(scene_id) for scene_id in ids]
+    accepted = tuple(SceneUse(scene=record.id) for record in records if record.state == "accepted")
+    spec = JobSpec(kind="render", scenes=accepted, views_per_scene=1, width=64, height=48, alpha=0.5)
     job = service.jobs.submit(spec, submitted_by="key_0")[0]
     while service.jobs.get(job.id).state not in FINAL_STATES and time.monotonic() < end:
         time.sleep(0.1)

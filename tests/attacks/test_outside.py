@@ -111,6 +111,14 @@ def _layers() -> dict[str, str]:
     return {"scene.usda": make.usda(body + _sheet("Plain", 1, "/None"), "subLayers = [@canary.usda@]")}
 
 
+def _outside(server: Path) -> dict[str, dict[str, str]]:
+    """Uploads that name what lies where the service was started, and are refused without a look at it."""
+    up = "../" * 6  # from a child's sources/DIGEST to the folder that has .diaphane
+    climbing = TEXTURE.replace("NAME", "Look").replace("PATH", f"{up}canary.png")
+    absolute = make.usda(f'def "Taken" (references = @{server}/canary.usda@) {{}}')
+    return {"climbing": {"scene.usda": make.usda(climbing)}, "absolute": {"scene.usda": absolute}}
+
+
 @dataclass(frozen=True)
 class Watched:
     """What one child asked for.
@@ -157,7 +165,7 @@ def audited(tmp_path_factory: pytest.TempPathFactory) -> Audited:
     for name in ("canary.usda", "canary.0.usda", "canary.1.usda"):
         (server / name).write_text(make.usda())
     stolen = f".diaphane/store/blobs/sha256/{digest[:2]}/{digest}"
-    for name, files in {"textures": _textures(stolen), "layers": _layers()}.items():
+    for name, files in {"textures": _textures(stolen), "layers": _layers(), **_outside(server)}.items():
         for file, text in files.items():
             path = folder / "scenes" / name / file
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -191,14 +199,16 @@ def _is_within(path: str, *folders: str) -> bool:
 
 
 def test_every_kind_of_process_was_watched(audited: Audited) -> None:
-    assert {scene["state"] for scene in audited.done["scenes"].values()} == {"accepted"}, audited.done["scenes"]
+    states = {name: scene["state"] for name, scene in audited.done["scenes"].items()}
+    refused = dict.fromkeys(("climbing", "absolute"), "rejected")
+    assert states == {"textures": "accepted", "layers": "accepted", **refused}, audited.done["scenes"]
     assert audited.done["job"]["state"] == "succeeded", audited.done["job"]
     assert set(audited.done["tasks"].values()) == {"done"}
     stages = {name.split()[0] for name in audited.done["tasks"]}
     assert stages == {"scene", "render"}
     rooms = [Path(child.room).name.split("-")[0] for child in audited.children]
     assert rooms.count("check") == len(audited.done["scenes"]), "a process for each check"
-    assert rooms.count("render") >= len(audited.done["scenes"]), "and one for each scene"
+    assert rooms.count("render") >= list(states.values()).count("accepted"), "and one for each scene that is rendered"
     for child in audited.children:
         own = [call for call in child.calls if any(_is_within(path, f"{child.room}/sources") for path in call.paths)]
         assert any(call.name.startswith("open") and call.done for call in own), "the log has what it should have"
@@ -242,8 +252,8 @@ def test_no_process_asks_for_the_input_of_another_task(audited: Audited) -> None
 
 
 def test_check_and_job_agree_on_what_is_missing(audited: Audited) -> None:
-    for name, scene in audited.done["scenes"].items():
-        found = [line for line in scene["facts"]["warnings"] if "not in the upload" not in line]
+    for name in audited.done["warnings"]:
+        found = [line for line in audited.done["scenes"][name]["facts"]["warnings"] if "not in the upload" not in line]
         told = [line for line in audited.done["warnings"][name] if not line.startswith("USD says")]
         assert not any(str(audited.folder) in line for line in audited.done["warnings"][name]), name
         assert [line for line in found if not line.startswith("USD found")] == told, name

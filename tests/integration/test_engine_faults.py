@@ -260,6 +260,19 @@ def test_a_check_goes_on_beyond_its_turn_where_nobody_waits(sqlite_fleet: Fleet)
     assert {name.rpartition("/")[2] for name, _ in ids} == {"0"}, "each was begun once"
 
 
+def test_a_check_that_is_taken_over_at_the_end_of_its_turn_shares_no_room_with_its_longer_one(
+    sqlite_fleet: Fleet,
+) -> None:
+    fleet = sqlite_fleet
+    scene_id = fleet.send("key_a", "slow a")
+    fleet.jobs.check_longer(f"check/key_a/{scene_id}/0")
+    fleet.worker(*ALL, CHECK_SECONDS="3").ready()
+    rooms = fleet.folder / "work"
+    until(lambda: len(list(rooms.glob("*/check-*/sources/*/a.usda"))) == 2)
+    until(lambda: fleet.checked(scene_id) == "rejected")
+    until(lambda: not list(rooms.glob("*/check-*")))
+
+
 def test_a_key_s_uploads_are_checked_one_after_the_other_by_the_clock(sqlite_fleet: Fleet) -> None:
     fleet = sqlite_fleet
     fleet.worker(*ALL, CHECK_SECONDS="2").ready()
