@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 from support.api import Api
-from support.browser import CHROMIUM, WEBGPU, browser
+from support.browser import CHROMIUM, WEBGPU, WEBGPU_AND_WEBGL, browser
 from support.dashboard import Shown, fill
 from support.web import install
 
@@ -50,10 +51,23 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 @pytest.fixture(scope="module")
 def webgpu(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     """A browser with WebGPU."""
+    with _capable(tmp_path_factory.mktemp("browser"), WEBGPU) as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def webgl(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A browser with WebGPU and WebGL 2, for pictures that are not shown."""
+    with _capable(tmp_path_factory.mktemp("browser"), WEBGPU_AND_WEBGL) as started:
+        yield started
+
+
+@contextmanager
+def _capable(folder: Path, flags: Sequence[str]) -> Iterator[Any]:
     pytest.importorskip("playwright.sync_api")
     if CHROMIUM is None:
         pytest.skip("chromium is not installed")
-    with browser(tmp_path_factory.mktemp("browser"), WEBGPU) as started:
+    with browser(folder, flags) as started:
         page = started.new_page()
         page.goto("chrome://version")
         if not page.evaluate("!!navigator.gpu && navigator.gpu.requestAdapter().then(Boolean)"):

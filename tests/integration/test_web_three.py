@@ -2,41 +2,27 @@
 
 from __future__ import annotations
 
-import functools
-import http.server
 import json
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from support.browser import Tab
-from support.web import ROOT, run
+from support.web import ROOT, three_page
 
 BUNDLE = ROOT / "benchmarks/bundle"
 
 
-class _Quiet(http.server.SimpleHTTPRequestHandler):
-    def log_message(self, format: str, *args: Any) -> None:
-        """Nothing: the test's own output is enough."""
-
-
 @pytest.fixture(scope="module")
-def page(webgpu: Any, installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
+def page(webgl: Any, installed: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Tab]:
     """The package's page of tests, in a browser with WebGPU."""
-    built = tmp_path_factory.mktemp("three")
-    done = run(
-        installed, "npx", "vite", "build", "-c", "packages/three/tests/page/vite.config.ts", "--outDir", str(built)
-    )
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(_Quiet, directory=built)) as server:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        opened = Tab(webgpu, f"http://127.0.0.1:{server.server_port}", 1000, "light")
+    with three_page(installed, tmp_path_factory.mktemp("three")) as url:
+        opened = Tab(webgl, url, 1000, "light")
         opened.page.goto("/")
         opened.until("!!globalThis.three")
         yield opened
-        server.shutdown()
+        opened.context.close()
 
 
 @pytest.fixture(scope="module")
@@ -53,10 +39,10 @@ _COMPARE = """async ([names, network]) => {
         whole: { budget: 8, bundle } };
     const found = {};
     for (const name of names) {
-        const right = await three.peel(renderer, three.SCENES[name]());
+        const right = await three.peel(renderer, await three.SCENES[name]());
         found[name] = { most: Math.max(...right.counts) };
         for (const [key, options] of Object.entries(wanted)) {
-            const { picture, budget, used } = await three.drawnBy(renderer, three.SCENES[name](), options);
+            const { picture, budget, used } = await three.drawnBy(renderer, await three.SCENES[name](), options);
             found[name][key] = { ...three.agreement(right.picture, picture), budget, used };
         }
     }
@@ -77,6 +63,7 @@ def test_pictures_are_those_of_sorted_fragments(page: Tab, network: list[str]) -
             assert 0 < deep["used"] <= deep["budget"], (name, deep)
         assert scene["deep"]["rmse"] < scene["binned"]["rmse"], (name, scene)
     knots = found["primitives"]
+    assert knots["binned"]["within"] >= 0.97  # fragments that something opaque hides have no part in it
     assert knots["deep"]["used"] == knots["deep"]["budget"]  # F, half a slot a pixel, is fewer than there are fragments
     assert knots["deep"]["rmse"] < knots["two"]["rmse"]  # which has four times the slots
     assert page.faults == []
@@ -134,3 +121,39 @@ def test_a_pass_goes_on_when_the_device_was_lost(page: Tab, network: list[str]) 
     assert apart["most"] == 0.0
     assert [fault for fault in page.faults if "Device Lost" not in fault and "device lost" not in fault.lower()] == []
     page.faults.clear()
+
+
+def test_webgl_2_draws_depth_bins_as_webgpu_does(page: Tab) -> None:
+    """And says once that a budget needs WebGPU."""
+    found = page.page.evaluate(
+        """async () => {
+            const [gpu, gl] = [await three.start(false), await three.start(true)];
+            const pictures = [];
+            for (const [renderer, budget] of [[gpu, 0], [gl, 0], [gl, 4]])
+                pictures.push(await three.linear(renderer, three.SCENES.primitives(), { budget }));
+            return [three.agreement(pictures[0], pictures[1]), three.agreement(pictures[1], pictures[2])];
+        }"""
+    )
+    assert found[0]["within"] >= 0.998, found  # silhouettes: another rasteriser
+    assert found[1]["most"] == 0.0
+    assert page.faults == ["A budget needs WebGPU, and this is WebGL 2. Depth bins alone are used."]
+    page.faults.clear()
+
+
+def test_depth_buffers_may_be_reversed_or_logarithmic(page: Tab) -> None:
+    """Of a scene in which something opaque hides fragments."""
+    found = page.page.evaluate(
+        """async () => {
+            const pictures = [];
+            const kinds = ['reversedDepthBuffer', 'logarithmicDepthBuffer'];
+            for (const more of [{}, ...kinds.map((kind) => ({ [kind]: true }))]) {
+                const renderer = await three.start(false, more);
+                pictures.push(await three.linear(renderer, three.SCENES.primitives(), { budget: 2 }));
+                for (const kind of kinds) if (renderer[kind] !== (kind in more)) throw new Error(kind);
+            }
+            return pictures.slice(1).map((each) => three.agreement(pictures[0], each));
+        }"""
+    )
+    for each in found:
+        assert each["within"] >= 0.999, found
+    assert page.faults == []

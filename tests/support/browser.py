@@ -25,6 +25,9 @@ WEBGPU = (
 )
 """Flags with which it has WebGPU, in software."""
 
+WEBGPU_AND_WEBGL = (*WEBGPU, "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+"""With which it has WebGL 2, too, and no canvas of WebGPU can be shown."""
+
 SCHEMES = ("light", "dark")
 
 

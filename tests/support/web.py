@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import functools
+import http.server
 import shutil
 import subprocess
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -38,3 +44,25 @@ def install(root: Path) -> Path:
         pytest.skip("the packages cannot be fetched: there is no network")
     assert done.returncode == 0, done.stderr[-2000:]
     return copy
+
+
+class _Quiet(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, format: str, *args: Any) -> None:
+        """Nothing: the test's own output is enough."""
+
+
+@contextmanager
+def three_page(installed: Path, built: Path) -> Iterator[str]:
+    """Builds the page that compares pictures of @diaphane/three, and serves it.
+
+    Args:
+        installed: Sources with their packages.
+        built: An empty folder.
+    """
+    config = "packages/three/tests/page/vite.config.ts"
+    done = run(installed, "npx", "vite", "build", "-c", config, "--outDir", str(built))
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(_Quiet, directory=built)) as server:
+        threading.Thread(target=server.serve_forever, args=(0.05,), daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()

@@ -45,7 +45,7 @@ export class Bins {
    *
    * @param share 0 where the fragment is hidden, else 1.
    */
-  outputs(share: Node<"float"> = float(1)): Record<string, Node> {
+  outputs(share: Node<"float">): Record<string, Node> {
     const outputs: Record<string, Node> = {};
     for (const i of FOURS) {
       outputs[`units${i}`] = this.#own(i).mul(this.#units).mul(share);

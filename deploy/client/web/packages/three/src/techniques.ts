@@ -2,7 +2,6 @@
 
 import { type Bundle, Gpu } from "@diaphane/core";
 import type { MRTNode, Object3D, OrthographicCamera, PerspectiveCamera, RenderTarget, WebGPURenderer } from "three/webgpu";
-import { float } from "three/tsl";
 import { Bins } from "./bins";
 import { Core, MOST } from "./core";
 import { Deep } from "./deep";
@@ -53,10 +52,9 @@ export class Techniques {
     this.#range = new Range(this.#depth, canBlendFloats(renderer));
     this.#visible = new Visible(picture);
     this.#bins = new Bins(this.#depth.here, this.#range.here);
-    this.#bins.target.depthTexture = this.#tail.target.depthTexture = picture.depthTexture;
     this.#binned = {
-      bins: summed(this.#bins.outputs()),
-      tail: this.#tail.mrt(this.#bins.weight, float(1)),
+      bins: summed(this.#bins.outputs(this.#visible.share)),
+      tail: this.#tail.mrt(this.#bins.weight, this.#visible.share),
       over: over(this.#tail.picture),
     };
     this.setSize(picture.width, picture.height);
@@ -170,8 +168,6 @@ function deviceOf(renderer: WebGPURenderer): GPUDevice | null {
 function refusal(renderer: WebGPURenderer, bytes: number): string {
   const limits = deviceOf(renderer)?.limits;
   if (!limits) return "A budget needs WebGPU, and this is WebGL 2.";
-  if (renderer.reversedDepthBuffer || renderer.logarithmicDepthBuffer)
-    return "A budget needs the depth buffer as three.js has it unless told otherwise, not reversed or logarithmic.";
   const most = Math.min(limits.maxStorageBufferBindingSize, limits.maxBufferSize);
   if (bytes > most) return `A budget of ${bytes} bytes in one buffer is above the ${most} of this device.`;
   return "";

@@ -1,6 +1,7 @@
-// Whether the opaque objects hide a fragment: a write to storage is not kept out by a depth test.
+// Whether the opaque objects hide a fragment: a write to storage is not kept out by a depth test, and targets that share
+// the depth of another are cleared of it by three.js when they are new.
 
-import type { Node, RenderTarget } from "three/webgpu";
+import type { Node, NodeBuilder, RenderTarget } from "three/webgpu";
 import {
   cameraFar,
   cameraNear,
@@ -10,13 +11,22 @@ import {
   positionView,
   screenUV,
   texture,
+  viewZToLogarithmicDepth,
   viewZToOrthographicDepth,
   viewZToPerspectiveDepth,
+  viewZToReversedOrthographicDepth,
+  viewZToReversedPerspectiveDepth,
 } from "three/tsl";
 import { alpha } from "./surface";
 
 /** Of a depth of the fixed functions, which is computed otherwise than here. */
 const BIAS = 2 ** -22;
+
+/** What decides how a depth buffer is filled. */
+type Told = NodeBuilder & {
+  readonly camera: { readonly isOrthographicCamera?: boolean };
+  readonly renderer: { readonly reversedDepthBuffer: boolean; readonly logarithmicDepthBuffer: boolean };
+};
 
 export class Visible {
   readonly is: Node<"bool">;
@@ -28,11 +38,19 @@ export class Visible {
     const behind = texture(picture.depthTexture!, screenUV).level(int(0)).r;
     this.is = Fn((builder) => {
       if (!builder.material.depthTest) return alpha.greaterThan(0);
-      const isFlat = (builder.camera as { isOrthographicCamera?: boolean }).isOrthographicCamera === true;
-      const placed = isFlat ? viewZToOrthographicDepth : viewZToPerspectiveDepth;
-      const here = placed(positionView.z, cameraNear, cameraFar);
-      return alpha.greaterThan(0).and(here.lessThanEqual(behind.add(BIAS)));
+      const { renderer, camera } = builder as Told;
+      const here = placed(renderer, camera.isOrthographicCamera === true)(positionView.z, cameraNear, cameraFar);
+      const isNearest = renderer.reversedDepthBuffer
+        ? here.greaterThanEqual(behind.sub(BIAS))
+        : here.lessThanEqual(behind.add(BIAS));
+      return alpha.greaterThan(0).and(isNearest);
     })().toVar();
     this.share = this.is.select(float(1), float(0)).toVar();
   }
+}
+
+function placed({ reversedDepthBuffer, logarithmicDepthBuffer }: Told["renderer"], isFlat: boolean) {
+  if (isFlat) return reversedDepthBuffer ? viewZToReversedOrthographicDepth : viewZToOrthographicDepth;
+  if (reversedDepthBuffer) return viewZToReversedPerspectiveDepth;
+  return logarithmicDepthBuffer ? viewZToLogarithmicDepth : viewZToPerspectiveDepth;
 }

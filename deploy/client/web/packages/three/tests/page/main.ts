@@ -1,35 +1,25 @@
 // What tests call: `three.compare(...)` and its like.
 
-import { DataUtils, type RenderTarget, RenderPipeline, WebGPURenderer } from "three/webgpu";
+import { RenderPipeline, WebGPURenderer } from "three/webgpu";
 import { type Bundle, tailOf } from "@diaphane/core";
 import { type DiaphaneOptions, diaphanePass } from "../../src/index";
 import { count, type Held, held } from "./counters";
+import { account, timed } from "./measure";
+import { type Agreement, agreement, deviceOf, encode, read } from "./pictures";
 import { peel, type Reference } from "./reference";
 import { SCENES, type Sample } from "./scenes";
 
 const [WIDTH, HEIGHT] = [256, 192];
 
-const encode = (linear: number): number => {
-  const x = Math.min(Math.max(linear, 0), 1);
-  return 255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
-};
-
 count();
 
-async function start(forceWebGL: boolean): Promise<WebGPURenderer> {
-  const renderer = new WebGPURenderer({ forceWebGL, antialias: false });
+async function start(forceWebGL: boolean, more: ConstructorParameters<typeof WebGPURenderer>[0] = {}): Promise<WebGPURenderer> {
+  const renderer = new WebGPURenderer({ forceWebGL, antialias: false, ...more });
   renderer.setPixelRatio(1);
   renderer.setSize(WIDTH, HEIGHT);
   document.body.append(renderer.domElement);
   await renderer.init();
   return renderer;
-}
-
-interface Agreement {
-  /** Share of pixels within 2 of 255, and root of the mean squared difference, in 255ths. */
-  readonly within: number;
-  readonly rmse: number;
-  readonly most: number;
 }
 
 /** A bundle of which only its network is known. */
@@ -40,15 +30,6 @@ function bundleOf(tail: string, wgsl: string): Bundle {
 
 async function linear(renderer: WebGPURenderer, sample: Sample, options: DiaphaneOptions): Promise<Float64Array> {
   return (await drawnBy(renderer, sample, options)).picture;
-}
-
-/** Linear, three a pixel; rows from the top, of WebGL from the bottom. */
-async function read(renderer: WebGPURenderer, target: RenderTarget): Promise<Float64Array> {
-  const { width, height } = target;
-  const halves = await renderer.readRenderTargetPixelsAsync(target, 0, 0, width, height);
-  const made = new Float64Array(3 * width * height);
-  for (let i = 0; i < made.length; i++) made[i] = DataUtils.fromHalfFloat(halves[Math.floor(i / 3) * 4 + (i % 3)]!);
-  return made;
 }
 
 /** The picture, and what `kbuffer-deep` gave its pixels. */
@@ -62,8 +43,6 @@ async function drawnBy(renderer: WebGPURenderer, sample: Sample, options: Diapha
   pipeline.dispose();
   return { picture, budget: slots?.budget ?? 0, used: slots?.k.reduce((sum, k) => sum + k, 0) ?? 0 };
 }
-
-const deviceOf = (renderer: WebGPURenderer): GPUDevice => (renderer.backend as unknown as { device: GPUDevice }).device;
 
 /** Pictures in turns, with each of some options, by one pass; what the device holds after each, and after `dispose`. */
 async function life(renderer: WebGPURenderer, sample: Sample, turns: readonly DiaphaneOptions[]): Promise<Held[]> {
@@ -107,21 +86,6 @@ function reversed(sample: Sample): Sample {
   return sample;
 }
 
-function agreement(one: Float64Array, two: Float64Array): Agreement {
-  let [within, squares, most] = [0, 0, 0];
-  for (let p = 0; p < one.length; p += 3) {
-    let apart = 0;
-    for (let c = 0; c < 3; c++) {
-      const difference = Math.abs(encode(one[p + c]!) - encode(two[p + c]!));
-      squares += difference ** 2;
-      apart = Math.max(apart, difference);
-    }
-    most = Math.max(most, apart);
-    if (apart <= 2) within++;
-  }
-  return { within: within / (one.length / 3), rmse: Math.sqrt(squares / one.length), most };
-}
-
 function drawn(picture: Float64Array, title: string): void {
   const canvas = Object.assign(document.createElement("canvas"), { width: WIDTH, height: HEIGHT, title });
   const pixels = new Uint8ClampedArray(4 * WIDTH * HEIGHT).fill(255);
@@ -130,6 +94,6 @@ function drawn(picture: Float64Array, title: string): void {
   document.body.append(canvas);
 }
 
-const three = { start, SCENES, life, lost, held, reversed, linear, drawnBy, bundleOf, peel: (r: WebGPURenderer, s: Sample): Promise<Reference> => peel(r, s, WIDTH, HEIGHT), agreement, drawn };
+const three = { start, account, timed, SCENES, life, lost, held, reversed, linear, drawnBy, bundleOf, peel: (r: WebGPURenderer, s: Sample): Promise<Reference> => peel(r, s, WIDTH, HEIGHT), agreement, drawn };
 Object.assign(globalThis, { three });
 export type Three = typeof three;

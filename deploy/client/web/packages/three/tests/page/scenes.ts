@@ -1,5 +1,7 @@
 // What pictures are compared of: each scene has something else that a material or an object can be.
 
+import { GLTFExporter } from "three/addons/exporters/GLTFExporter.js";
+import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import {
   Bone,
   BoxGeometry,
@@ -115,14 +117,15 @@ function textured(): Sample {
   return sample;
 }
 
-/** A bent tube of two bones, twice. */
-function skinned(): Sample {
+/** A bent tube of two bones, twice; as glTF, written and read by three.js. */
+async function skinned(): Promise<Sample> {
   const sample = lit(4.5);
   const geometry = new CylinderGeometry(0.5, 0.5, 2.4, 24, 12, true);
   const place = geometry.getAttribute("position");
   const share = Array.from({ length: place.count }, (_, i) => Math.min(Math.max(place.getY(i) / 2.4 + 0.5, 0), 1));
   geometry.setAttribute("skinIndex", new Uint16BufferAttribute(share.flatMap(() => [0, 1, 0, 0]), 4));
   geometry.setAttribute("skinWeight", new Float32BufferAttribute(share.flatMap((s) => [1 - s, s, 0, 0]), 4));
+  const tubes = new Scene();
   for (const [i, color] of [0xff8822, 0x22aaff].entries()) {
     const material = new MeshStandardMaterial({ color, opacity: 0.5, transparent: true, side: DoubleSide });
     const mesh = new SkinnedMesh(geometry, material);
@@ -132,8 +135,10 @@ function skinned(): Sample {
     mesh.bind(new Skeleton([root, tip]));
     tip.rotation.z = i ? -0.9 : 0.9;
     mesh.position.set(i ? 0.35 : -0.35, 0, i ? 0.1 : -0.1);
-    sample.scene.add(mesh);
+    tubes.add(mesh);
   }
+  const file = (await new GLTFExporter().parseAsync(tubes, { binary: true })) as ArrayBuffer;
+  sample.scene.add((await new GLTFLoader().parseAsync(file, "")).scene);
   return sample;
 }
 
@@ -164,4 +169,4 @@ function panes(): Sample {
   return sample;
 }
 
-export const SCENES: Readonly<Record<string, () => Sample>> = { primitives, instanced, textured, skinned, sheets, panes };
+export const SCENES: Readonly<Record<string, () => Sample | Promise<Sample>>> = { primitives, instanced, textured, skinned, sheets, panes };

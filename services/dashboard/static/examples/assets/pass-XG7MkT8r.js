@@ -1,4 +1,4 @@
-import{$t as e,A as t,B as n,C as r,D as i,E as a,F as o,H as s,I as c,It as l,L as u,M as d,N as f,O as ee,P as p,Qt as te,R as m,S as h,U as g,V as ne,Xt as re,Zt as _,_ as ie,_n as v,a as y,b as ae,c as oe,d as b,f as x,g as se,h as ce,hn as le,i as S,it as ue,j as C,k as de,l as fe,m as w,mn as T,o as E,on as pe,ot as me,p as D,pn as he,r as ge,s as _e,u as ve,v as ye,w as O,x as be,y as xe,z as Se}from"./frame-6j6AnsRG.js";var k={"binned-8":{kind:`BINNED`,bins:8,shareLevels:255,meanLevels:255},"binned-12":{kind:`BINNED`,bins:12,shareLevels:255,meanLevels:255},"binned-16":{kind:`BINNED`,bins:16,shareLevels:255,meanLevels:255},"density-16":{kind:`BINNED`,bins:16,shareLevels:15,meanLevels:0},density:{kind:`DENSITY`,bins:0,shareLevels:0,meanLevels:0},"exact-coverage":{kind:`EXACT_COVERAGE`,bins:0,shareLevels:0,meanLevels:0},"weighted-average":{kind:`WEIGHTED_AVERAGE`,bins:0,shareLevels:0,meanLevels:0},paper:{kind:`PAPER`,bins:0,shareLevels:0,meanLevels:0}},Ce=`binned-12`,A={FULL:`255`,MOST_CORE:`1023`,RANKS:`256`,PRICE_STEPS:`8.0`,LEAST_PRICE:`-4.0`,LEAST_PRIOR:`-40.0`,LEAST_COVERED:`0.0001`,LEAST_ALONE:`0.001`,MOST_ALONE:`0.5`,LEAST_IMPORTANCE:`9.313225746154785e-10`,ROOT_SHARE:`0.6`,PLAIN_SHARE:`0.4`,OPTICAL_UNIT:`253`,BIN_LIMIT:`4095`,COUNT_LIMIT:`255`,RANGE_TILE:`8`,MOST_OPACITY:`16.0`,LEAST_OTHERS:`0.001`,LEAST_SPREAD:`0.001`,LUMA_R:`54`,LUMA_G:`183`,LUMA_B:`19`,LUMA_SHIFT:`6`,LUMA_SQUARE_SHIFT:`14`,MAX_EXPONENT:`60.0`},we=[`maxStorageBufferBindingSize`,`maxBufferSize`,`maxTextureDimension2D`],Te=class e{device;description;blendsFloat32;#e=new Map;constructor(e,t){this.device=e,this.description=t,this.blendsFloat32=e.features.has(`float32-blendable`)}static async open(){if(!globalThis.isSecureContext)throw new v(`Browsers offer WebGPU on secure pages only.`,`Open this page by https, or as localhost.`);if(!navigator.gpu)throw new v(`This browser has no WebGPU.`,`Use a current Chrome, Edge, Safari or Firefox; on Linux WebGPU may have to be switched on in its settings.`);let t=await navigator.gpu.requestAdapter({powerPreference:`high-performance`});if(!t)throw new v(`The browser has WebGPU, but no graphics adapter for it.`,`Switch on hardware acceleration in the browser's settings, or update the graphics driver.`);let n={};for(let e of we)n[e]=t.limits[e];let r=[`float32-blendable`].filter(e=>t.features.has(e)),i=await t.requestDevice({requiredFeatures:r,requiredLimits:n}).catch(()=>{throw new v(`The browser has WebGPU, but cannot open the graphics device.`,`Load the page again.`)}),{vendor:a,architecture:o,description:s}=t.info;return new e(i,s||[a,o].filter(Boolean).join(` `)||`unknown adapter`)}static of(t){return new e(t,`a device that was opened elsewhere`)}get sumFormat(){return this.blendsFloat32?`rgba32float`:`rgba16float`}get scalarFormat(){return this.blendsFloat32?`r32float`:`r16float`}words(e){let t=4*Math.max(e,1),{maxStorageBufferBindingSize:n,maxBufferSize:r}=this.device.limits;j(t,Math.min(n,r),`Make the window smaller, or the budget.`);let{STORAGE:i,COPY_SRC:a,COPY_DST:o}=GPUBufferUsage;return this.device.createBuffer({size:t,usage:i|a|o})}filled(e,t){let n=Math.ceil(Math.max(e.byteLength,4)/4)*4;j(n,this.device.limits.maxBufferSize,`Open a smaller scene.`);let r=this.device.createBuffer({size:n,usage:t|GPUBufferUsage.COPY_DST,mappedAtCreation:!0}),i=new Uint8Array(e.buffer,e.byteOffset,e.byteLength);return new Uint8Array(r.getMappedRange()).set(i),r.unmap(),r}compute(e,t){let n=`${t}\n${e}`,r=this.#e.get(n);if(!r){let i=this.device.createShaderModule({code:e,label:t});r=this.device.createComputePipeline({label:t,layout:`auto`,compute:{module:i,entryPoint:t}}),this.#e.set(n,r)}return r}bind(e,t){return this.device.createBindGroup({layout:e.getBindGroupLayout(0),entries:Ee(t)})}async read(e){let{MAP_READ:t,COPY_DST:n}=GPUBufferUsage,r=this.device.createBuffer({size:e.size,usage:t|n}),i=this.device.createCommandEncoder();i.copyBufferToBuffer(e,0,r,0,e.size),this.device.queue.submit([i.finish()]),await r.mapAsync(GPUMapMode.READ);let a=new Uint32Array(r.getMappedRange().slice(0));return r.destroy(),a}};function j(e,t,n){if(e<=t)return;let[r,i]=[Math.ceil(e/2**20),Math.floor(t/2**20)];throw new v(`A buffer of ${r} MiB is above this device's limit, ${i} MiB.`,n)}function Ee(e){return e.map((e,t)=>({binding:t,resource:e instanceof GPUBuffer?{buffer:e}:e}))}function De(e){let t=Math.max(1,Math.ceil(e/64)),n=Math.min(t,1024);return[n,Math.ceil(t/n)]}var Oe=class extends Error{},M=class{gpu;isWanted;#e=null;constructor(e,t=()=>!0){this.gpu=e,this.isWanted=t}get encoder(){return this.#e??=this.gpu.device.createCommandEncoder()}submit(){this.#e&&this.gpu.device.queue.submit([this.#e.finish()]),this.#e=null}async pause(){if(this.submit(),await this.gpu.device.queue.onSubmittedWorkDone(),!this.isWanted())throw new Oe}},ke=`// Adds a fragment to its depth bin, one word, and its colour to its pixel's luma, another: one atomic exchange each
+import{$t as e,A as t,B as n,C as r,D as i,E as a,F as o,G as s,H as c,I as l,K as u,L as d,M as f,N as p,O as ee,P as m,R as h,S as g,U as te,V as ne,W as re,_ as ie,_n as ae,a as _,b as oe,bn as v,c as se,d as y,en as b,f as x,g as ce,gn as le,h as ue,i as de,j as S,k as fe,l as pe,ln as me,lt as he,m as C,nn as ge,o as w,p as T,r as _e,s as ve,st as ye,tn as be,u as xe,v as Se,vn as Ce,w as E,x as we,y as Te,z as D,zt as O}from"./frame-Bmo7VneG.js";var k={"binned-8":{kind:`BINNED`,bins:8,shareLevels:255,meanLevels:255},"binned-12":{kind:`BINNED`,bins:12,shareLevels:255,meanLevels:255},"binned-16":{kind:`BINNED`,bins:16,shareLevels:255,meanLevels:255},"density-16":{kind:`BINNED`,bins:16,shareLevels:15,meanLevels:0},density:{kind:`DENSITY`,bins:0,shareLevels:0,meanLevels:0},"exact-coverage":{kind:`EXACT_COVERAGE`,bins:0,shareLevels:0,meanLevels:0},"weighted-average":{kind:`WEIGHTED_AVERAGE`,bins:0,shareLevels:0,meanLevels:0},paper:{kind:`PAPER`,bins:0,shareLevels:0,meanLevels:0}},Ee=`binned-12`,A={FULL:`255`,MOST_CORE:`1023`,RANKS:`256`,PRICE_STEPS:`8.0`,LEAST_PRICE:`-4.0`,LEAST_PRIOR:`-40.0`,LEAST_COVERED:`0.0001`,LEAST_ALONE:`0.001`,MOST_ALONE:`0.5`,LEAST_IMPORTANCE:`9.313225746154785e-10`,ROOT_SHARE:`0.6`,PLAIN_SHARE:`0.4`,OPTICAL_UNIT:`253`,BIN_LIMIT:`4095`,COUNT_LIMIT:`255`,RANGE_TILE:`8`,MOST_OPACITY:`16.0`,LEAST_OTHERS:`0.001`,LEAST_SPREAD:`0.001`,LUMA_R:`54`,LUMA_G:`183`,LUMA_B:`19`,LUMA_SHIFT:`6`,LUMA_SQUARE_SHIFT:`14`,MAX_EXPONENT:`60.0`},De=[`maxStorageBufferBindingSize`,`maxBufferSize`,`maxTextureDimension2D`],Oe=class e{device;description;blendsFloat32;#e=new Map;constructor(e,t){this.device=e,this.description=t,this.blendsFloat32=e.features.has(`float32-blendable`)}static async open(){if(!globalThis.isSecureContext)throw new v(`Browsers offer WebGPU on secure pages only.`,`Open this page by https, or as localhost.`);if(!navigator.gpu)throw new v(`This browser has no WebGPU.`,`Use a current Chrome, Edge, Safari or Firefox; on Linux WebGPU may have to be switched on in its settings.`);let t=await navigator.gpu.requestAdapter({powerPreference:`high-performance`});if(!t)throw new v(`The browser has WebGPU, but no graphics adapter for it.`,`Switch on hardware acceleration in the browser's settings, or update the graphics driver.`);let n={};for(let e of De)n[e]=t.limits[e];let r=[`float32-blendable`].filter(e=>t.features.has(e)),i=await t.requestDevice({requiredFeatures:r,requiredLimits:n}).catch(()=>{throw new v(`The browser has WebGPU, but cannot open the graphics device.`,`Load the page again.`)}),{vendor:a,architecture:o,description:s}=t.info;return new e(i,s||[a,o].filter(Boolean).join(` `)||`unknown adapter`)}static of(t){return new e(t,`a device that was opened elsewhere`)}get sumFormat(){return this.blendsFloat32?`rgba32float`:`rgba16float`}get scalarFormat(){return this.blendsFloat32?`r32float`:`r16float`}words(e){let t=4*Math.max(e,1),{maxStorageBufferBindingSize:n,maxBufferSize:r}=this.device.limits;j(t,Math.min(n,r),`Make the window smaller, or the budget.`);let{STORAGE:i,COPY_SRC:a,COPY_DST:o}=GPUBufferUsage;return this.device.createBuffer({size:t,usage:i|a|o})}filled(e,t){let n=Math.ceil(Math.max(e.byteLength,4)/4)*4;j(n,this.device.limits.maxBufferSize,`Open a smaller scene.`);let r=this.device.createBuffer({size:n,usage:t|GPUBufferUsage.COPY_DST,mappedAtCreation:!0}),i=new Uint8Array(e.buffer,e.byteOffset,e.byteLength);return new Uint8Array(r.getMappedRange()).set(i),r.unmap(),r}compute(e,t){let n=`${t}\n${e}`,r=this.#e.get(n);if(!r){let i=this.device.createShaderModule({code:e,label:t});r=this.device.createComputePipeline({label:t,layout:`auto`,compute:{module:i,entryPoint:t}}),this.#e.set(n,r)}return r}bind(e,t){return this.device.createBindGroup({layout:e.getBindGroupLayout(0),entries:ke(t)})}async read(e){let{MAP_READ:t,COPY_DST:n}=GPUBufferUsage,r=this.device.createBuffer({size:e.size,usage:t|n}),i=this.device.createCommandEncoder();i.copyBufferToBuffer(e,0,r,0,e.size),this.device.queue.submit([i.finish()]),await r.mapAsync(GPUMapMode.READ);let a=new Uint32Array(r.getMappedRange().slice(0));return r.destroy(),a}};function j(e,t,n){if(e<=t)return;let[r,i]=[Math.ceil(e/2**20),Math.floor(t/2**20)];throw new v(`A buffer of ${r} MiB is above this device's limit, ${i} MiB.`,n)}function ke(e){return e.map((e,t)=>({binding:t,resource:e instanceof GPUBuffer?{buffer:e}:e}))}function Ae(e){let t=Math.max(1,Math.ceil(e/64)),n=Math.min(t,1024);return[n,Math.ceil(t/n)]}var je=class extends Error{},M=class{gpu;isWanted;#e=null;constructor(e,t=()=>!0){this.gpu=e,this.isWanted=t}get encoder(){return this.#e??=this.gpu.device.createCommandEncoder()}submit(){this.#e&&this.gpu.device.queue.submit([this.#e.finish()]),this.#e=null}async pause(){if(this.submit(),await this.gpu.device.queue.onSubmittedWorkDone(),!this.isWanted())throw new je}},Me=`// Adds a fragment to its depth bin, one word, and its colour to its pixel's luma, another: one atomic exchange each
 // (renderer/shaders/gather/bins.frag). \`words\`, [P][BINS], and \`luma\`, [P], are declared beside it, atomic.
 fn units_in(optical_depth: f32) -> u32 {
     return u32(max(1.0, floor(optical_depth * OPTICAL_UNIT + 0.5)));
@@ -40,7 +40,7 @@ fn add_luma(p: u32, units: u32, rgb: vec3u) {
         before = tried.old_value;
     }
 }
-`,Ae=`// Pixels of the window that every 64 triangles cover, those that overlap counted again: what drawing them will cost,
+`,Ne=`// Pixels of the window that every 64 triangles cover, those that overlap counted again: what drawing them will cost,
 // known before the first of them is drawn.
 @group(0) @binding(1) var<storage, read> positions: array<f32>;     // [vertices][3]
 @group(0) @binding(2) var<storage, read> indices: array<u32>;       // [triangles][3]
@@ -134,7 +134,7 @@ fn add_areas(
     }
     areas[place] = sum;
 }
-`,je=`// Whether there is anything to choose.
+`,Pe=`// Whether there is anything to choose.
 @group(0) @binding(0) var<storage, read_write> state: Cuts;
 @group(0) @binding(1) var<uniform> budget: u32;
 
@@ -142,7 +142,7 @@ fn add_areas(
 fn begin_cuts() {
     state.complete = select(0u, 1u, state.fragments <= budget);
 }
-`,Me=`// A pixel's words, BINS of them side by side (renderer/shaders/common/bin_words.glsl). \`words\`, [P][BINS], is declared
+`,Fe=`// A pixel's words, BINS of them side by side (renderer/shaders/common/bin_words.glsl). \`words\`, [P][BINS], is declared
 // before.
 // Gathered: word b is bin b. From the highest bits on: 12 of optical depth in units, 12 of the units times the position in
 // the bin, 8 of fragments; each stops at its most, so that sums do not depend on the order.
@@ -170,7 +170,7 @@ fn moment_of(word: u32) -> u32 {
 fn fragments_of(word: u32) -> u32 {
     return word & COUNT_LIMIT;
 }
-`,Ne=`// \`binned\`: every fragment into the tail's sums (renderer/shaders/binned/tail.frag).
+`,Ie=`// \`binned\`: every fragment into the tail's sums (renderer/shaders/binned/tail.frag).
 @fragment
 fn blend_tail(in: Surface) -> Tail {
     let stored = stored_surface(in);
@@ -180,7 +180,7 @@ fn blend_tail(in: Surface) -> Tail {
     }
     return tail_of(pixel_of(in), bitcast<f32>(depth_bits(in)), stored);
 }
-`,Pe=`// Depth bins of the binned tails (METHOD.md section 2): renderer/shaders/common/depth_bins.glsl and tile_range.glsl.
+`,Le=`// Depth bins of the binned tails (METHOD.md section 2): renderer/shaders/common/depth_bins.glsl and tile_range.glsl.
 fn tile_of(p: u32, width: u32) -> u32 {
     return p / width / RANGE_TILE * ((width + RANGE_TILE - 1) / RANGE_TILE) + p % width / RANGE_TILE;
 }
@@ -194,7 +194,7 @@ fn bin_place(z: f32, range: vec2f) -> f32 {
 fn bin_of(place: f32) -> u32 {
     return min(u32(place), BINS - 1u);
 }
-`,Fe=`// Weighted-blended transparency (McGuire and Bavoil 2013), equation 10 with the logarithmic depth of
+`,Re=`// Weighted-blended transparency (McGuire and Bavoil 2013), equation 10 with the logarithmic depth of
 // renderer/techniques/weighted_blended.py.
 struct Sums {
     @location(0) colours: vec4f,  // sum w a C, sum w a
@@ -222,7 +222,7 @@ fn blend_sums(in: Surface) -> Sums {
     let weight = a * depth_weight(bitcast<f32>(depth_bits(in))) * a;  // w has a factor a, the colour is premultiplied
     return Sums(vec4f(weight * root * root, weight), -log(1.0 - a));
 }
-`,Ie=`// Where a view is seen from.
+`,ze=`// Where a view is seen from.
 struct Camera {
     world_to_view: mat4x4f,
     projection: mat4x4f,
@@ -237,7 +237,7 @@ struct Camera {
 fn clip_position(position: vec3f) -> vec4f {
     return camera.projection * (camera.world_to_view * vec4f(position, 1.0));
 }
-`,Le=`// Every transparent fragment into its pixel's run of the pool, in any order: the sort comes after
+`,Be=`// Every transparent fragment into its pixel's run of the pool, in any order: the sort comes after
 // (renderer/shaders/sbuffer/capture.frag). A cursor counts what its pixel has captured.
 @group(2) @binding(0) var<storage, read> offsets: array<u32>;                 // [P + 1]
 @group(2) @binding(1) var<storage, read_write> cursors: array<atomic<u32>>;   // [P]
@@ -255,7 +255,7 @@ fn capture(in: Surface) {
         pool[at] = vec2u(pack(stored), depth_bits(in));
     }
 }
-`,Re=`// Fragments of a pixel's first bins are appended to its core, the others go to the tail
+`,Ve=`// Fragments of a pixel's first bins are appended to its core, the others go to the tail
 // (renderer/shaders/kbuffer-deep/capture.frag). What a rounding brings beyond a run goes to the tail, too.
 @group(2) @binding(2) var<storage, read> offsets: array<u32>;                // [P + 1]
 @group(2) @binding(3) var<storage, read> cuts: array<u32>;                   // [P], bins of the core
@@ -281,7 +281,7 @@ fn capture_core(in: Surface) -> Tail {
     }
     return tail_of(p, bitcast<f32>(z), stored);
 }
-`,ze=`// Second pass of the chain: every fragment finds its slot by its depth, or goes to the tail
+`,He=`// Second pass of the chain: every fragment finds its slot by its depth, or goes to the tail
 // (renderer/shaders/kbuffer/chain_colour.frag). Depths and colours are kept inverted.
 @group(2) @binding(2) var<storage, read> offsets: array<u32>;  // [P + 1]
 @group(2) @binding(3) var<storage, read> depths: array<u32>;
@@ -322,7 +322,7 @@ fn chain_colour(in: Surface) -> Tail {
     }
     return tail_of(p, bitcast<f32>(~z), unpack(~word));
 }
-`,Be=`// First pass of the two-pass chain: the k(p) smallest depths, lock-free and in any order of arrival
+`,Ue=`// First pass of the two-pass chain: the k(p) smallest depths, lock-free and in any order of arrival
 // (renderer/shaders/kbuffer/chain_depth.frag). Depths are kept inverted, so that an empty slot is zero: each keeps the
 // maximum of what passes it and hands the smaller value on.
 @group(2) @binding(0) var<storage, read> offsets: array<u32>;  // [P + 1]
@@ -349,7 +349,7 @@ fn chain_depth(in: Surface) {
         z = min(z, before);
     }
 }
-`,Ve=`// The rank that the budget ends in. One work group.
+`,We=`// The rank that the budget ends in. One work group.
 @group(0) @binding(0) var<storage, read_write> state: Cuts;
 @group(0) @binding(1) var<storage, read> counted: array<u32>;  // [RANKS]
 @group(0) @binding(2) var<uniform> budget: u32;
@@ -377,7 +377,7 @@ fn choose(@builtin(local_invocation_index) lane: u32) {
         state.rank = i;
     }
 }
-`,He=`// Fragments that can be in a core.
+`,Ge=`// Fragments that can be in a core.
 @group(0) @binding(0) var<storage, read> words: array<u32>;                   // [P][BINS]
 @group(0) @binding(1) var<storage, read_write> fragments: array<atomic<u32>>;  // the first member of Cuts
 var<workgroup> found: atomic<u32>;
@@ -401,7 +401,7 @@ fn total_cores(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
         atomicAdd(&fragments[0], atomicLoad(&found));
     }
 }
-`,Ue=`// n(p), the transparent fragments of every pixel.
+`,Ke=`// n(p), the transparent fragments of every pixel.
 @group(2) @binding(0) var<storage, read_write> n: array<atomic<u32>>;
 
 @fragment
@@ -412,7 +412,7 @@ fn count_fragments(in: Surface) {
     }
     atomicAdd(&n[pixel_of(in)], 1u);
 }
-`,We=`// Fragments by the rank of the price that they come at.
+`,qe=`// Fragments by the rank of the price that they come at.
 @group(0) @binding(0) var<storage, read> words: array<u32>;                   // [P][BINS]
 @group(0) @binding(1) var<storage, read> state: Cuts;
 @group(0) @binding(2) var<storage, read_write> counted: array<atomic<u32>>;   // [RANKS]
@@ -449,19 +449,19 @@ fn count_prices(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
         }
     }
 }
-`,Ge=`// A triangle that covers the window.
+`,Je=`// A triangle that covers the window.
 @vertex
 fn cover(@builtin(vertex_index) corner: u32) -> @builtin(position) vec4f {
     return vec4f(select(-1.0, 3.0, corner == 1u), select(-1.0, 3.0, corner == 2u), 0.0, 1.0);
 }
-`,Ke=`// What the passes of a selection of cuts tell each other (renderer/shaders/allocation/state.glsl).
+`,Ye=`// What the passes of a selection of cuts tell each other (renderer/shaders/allocation/state.glsl).
 struct Cuts {
     fragments: u32,  // that can be in a core
     complete: u32,   // 1 where the budget covers them: nothing is predicted or selected
     rank: u32,       // of the price that all pixels are granted, plus 1: what grows there takes what is left
     sure: u32,       // fragments below it
 }
-`,qe=`// A pixel's packed bins as a selection of cuts sees them (renderer/shaders/allocation/bins.glsl). \`words\`, [P][BINS], is
+`,Xe=`// A pixel's packed bins as a selection of cuts sees them (renderer/shaders/allocation/bins.glsl). \`words\`, [P][BINS], is
 // declared before.
 fn count_of(p: u32, bin: u32) -> u32 {
     return (words[counts_at(p, bin / 4u)] >> (8u * (bin & 3u))) & FULL;
@@ -486,7 +486,7 @@ fn usable_in(p: u32, bin: u32, before: u32) -> u32 {
 fn rank_in(p: u32, bin: u32) -> u32 {
     return (words[ranks_at(p, bin / 4u)] >> (8u * (bin & 3u))) & (RANKS - 1u);
 }
-`,Je=`// Sum of squared differences of two pictures' sRGB bytes, by block: integers, so exact. 2048 pixels fit a word.
+`,Ze=`// Sum of squared differences of two pictures' sRGB bytes, by block: integers, so exact. 2048 pixels fit a word.
 @group(0) @binding(0) var<storage, read> one: array<u32>;
 @group(0) @binding(1) var<storage, read> two: array<u32>;
 @group(0) @binding(2) var<storage, read_write> squares: array<u32>;  // [blocks]
@@ -510,7 +510,7 @@ fn add_squares(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
         squares[group.x] = atomicLoad(&sum);
     }
 }
-`,Ye=`// What a screen gets of linear light: one word a pixel, sRGB in three bytes and in the highest one k, up to 255.
+`,Qe=`// What a screen gets of linear light: one word a pixel, sRGB in three bytes and in the highest one k, up to 255.
 fn encoded(linear: vec3f) -> vec3u {
     let c = clamp(linear, vec3f(0.0), vec3f(1.0));
     let curved = 1.055 * pow(c, vec3f(1.0 / 2.4)) - 0.055;
@@ -541,7 +541,7 @@ fn tail_over(sums: vec4f, depth: f32, root: vec3f) -> vec3f {
     let through = exp(-depth);
     return (1.0 - through) * (sums.rgb / sums.a) + through * root * root;
 }
-`,Xe=`// Tiles whose centre no surface covers get the range of those around them, else that of the whole view
+`,$e=`// Tiles whose centre no surface covers get the range of those around them, else that of the whole view
 // (renderer/shaders/range/fill.comp). One work group.
 @group(0) @binding(0) var<storage, read> found: array<vec2u>;            // [T], ~ nearest, farthest, float bits
 @group(0) @binding(1) var<storage, read_write> ranges: array<vec2f>;     // [T], nearest and extent, metres
@@ -586,7 +586,7 @@ fn fill_ranges(@builtin(local_invocation_index) lane: u32) {
         ranges[tile] = vec2f(ends.x, ends.y - ends.x);
     }
 }
-`,Ze=`// What every pixel gets below the chosen rank, and with what comes at it.
+`,et=`// What every pixel gets below the chosen rank, and with what comes at it.
 @group(0) @binding(0) var<storage, read> words: array<u32>;               // [P][BINS]
 @group(0) @binding(1) var<storage, read> state: Cuts;
 @group(0) @binding(2) var<storage, read_write> cuts: array<u32>;          // [P], 5, 10, 5 and 10 bits
@@ -640,7 +640,7 @@ fn find_cuts(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_inde
         sums[group.x] = vec2u(atomicLoad(&sure), atomicLoad(&growth));
     }
 }
-`,Qe=`// Offsets of the fixed k-buffer: the same number of slots for every pixel of the window.
+`,tt=`// Offsets of the fixed k-buffer: the same number of slots for every pixel of the window.
 @group(0) @binding(0) var<storage, read_write> offsets: array<u32>;  // [P + 1]
 @group(0) @binding(1) var<uniform> budget: u32;
 
@@ -651,7 +651,7 @@ fn place_fixed(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups
         offsets[p] = p * (budget / (arrayLength(&offsets) - 1u));
     }
 }
-`,$e=`// Every fragment into its depth bin; for a network, its colour as well (renderer/shaders/gather/bins.frag).
+`,nt=`// Every fragment into its depth bin; for a network, its colour as well (renderer/shaders/gather/bins.frag).
 @group(2) @binding(0) var<storage, read> ranges: array<vec2f>;             // [T]
 @group(2) @binding(1) var<storage, read_write> words: array<atomic<u32>>;  // [P][BINS]
 @group(2) @binding(2) var<storage, read_write> luma: array<atomic<u32>>;   // [P], sums of luma and of its square
@@ -685,7 +685,7 @@ fn gather_all(in: Surface) {
     }
     add_luma(pixel_of(in), gather(in, stored), stored.rgb);
 }
-`,et=`// A fragment in a pool: depth bits; red and green, blue and opacity, as half floats.
+`,rt=`// A fragment in a pool: depth bits; red and green, blue and opacity, as half floats.
 struct Slot {
     depth: u32,
     front: u32,
@@ -698,7 +698,7 @@ fn comes_before(one: Slot, two: Slot) -> bool {
     }
     return one.front < two.front || (one.front == two.front && one.back < two.back);
 }
-`,tt=`// What the depth bins know to be in front of a fragment (renderer/shaders/kbuffer/tail.glsl).
+`,it=`// What the depth bins know to be in front of a fragment (renderer/shaders/kbuffer/tail.glsl).
 // Optical depth in front of a fragment: all of the bins before its own, and of its own bin's others as much as lies
 // before it if they are spread evenly around their mean.
 fn in_front(p: u32, place: f32, own: f32) -> f32 {
@@ -720,7 +720,7 @@ fn in_front(p: u32, place: f32, own: f32) -> f32 {
     let spread = max(min(middle, 1.0 - middle), LEAST_SPREAD);
     return before + others * clamp((s - (middle - spread)) / (2.0 * spread), 0.0, 1.0);
 }
-`,nt=`// From the blocks' totals to the view's. One work group.
+`,at=`// From the blocks' totals to the view's. One work group.
 @group(0) @binding(0) var<storage, read> blocks: array<vec3u>;             // fragments, occupied, deepest
 @group(0) @binding(1) var<storage, read_write> counted: array<u32>;        // the same of the view
 var<workgroup> part: array<vec3u, 256>;
@@ -749,7 +749,7 @@ fn join(@builtin(local_invocation_index) lane: u32) {
     counted[1] = own.y;
     counted[2] = own.z;
 }
-`,rt=`// What is kept of a pixel's depth bins, 16 bits each, two a word, and what it says of a fragment
+`,ot=`// What is kept of a pixel's depth bins, 16 bits each, two a word, and what it says of a fragment
 // (renderer/shaders/common/kept_bins.glsl). \`words\`, [P][BINS], is declared before.
 fn kept_word(p: u32, bin: u32) -> u32 {
     return (words[BINS * p + bin / 2u] >> (16u * (bin & 1u))) & 0xffffu;
@@ -768,7 +768,7 @@ fn share_behind(word: u32) -> f32 {
 fn mean_in(word: u32) -> f32 {
     return select(0.5, f32(word & 255u) / f32(max(MEAN_LEVELS, 1)), MEAN_LEVELS > 0);
 }
-`,it=`// The next smaller level of a texture. The texture unit decodes and encodes sRGB: it is light that is averaged.
+`,st=`// The next smaller level of a texture. The texture unit decodes and encodes sRGB: it is light that is averaged.
 @group(0) @binding(0) var finer: texture_2d<f32>;
 @group(0) @binding(1) var smooth_sampler: sampler;
 
@@ -777,7 +777,7 @@ fn halve(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let size = max(textureDimensions(finer) / 2u, vec2u(1u));
     return textureSample(finer, smooth_sampler, position.xy / vec2f(size));
 }
-`,at=`// The background of every technique: opaque fragments only, stored gamma-2 like the transparent ones.
+`,ct=`// The background of every technique: opaque fragments only, stored gamma-2 like the transparent ones.
 @fragment
 fn opaque_colour(in: Surface) -> @location(0) vec4f {
     let stored = stored_surface(in);
@@ -786,7 +786,7 @@ fn opaque_colour(in: Surface) -> @location(0) vec4f {
     }
     return vec4f(stored) / 255.0;
 }
-`,ot=`// What is kept of every pixel's gathered depth bins, and the fragments of each, in their place
+`,lt=`// What is kept of every pixel's gathered depth bins, and the fragments of each, in their place
 // (renderer/shaders/gather/pack.comp): of bin b the share of optical depth in front of the next one, times 256, and its mean
 // position; of the last one D in units.
 @group(0) @binding(0) var<storage, read_write> words: array<u32>;  // [P][BINS]
@@ -837,7 +837,7 @@ fn pack_bins(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) 
         words[counts_at(p, i)] = four;
     }
 }
-`,st=`// What the passes over pixels share: a pixel for each thread, 64 a group, in two dimensions.
+`,ut=`// What the passes over pixels share: a pixel for each thread, 64 a group, in two dimensions.
 fn thread_of(id: vec3u, groups: vec3u) -> u32 {
     return id.y * groups.x * 64u + id.x;
 }
@@ -847,7 +847,7 @@ fn texel_of(picture: texture_2d<f32>, p: u32) -> vec4f {
     let width = textureDimensions(picture).x;
     return textureLoad(picture, vec2u(p % width, p / width), 0);
 }
-`,ct=`// Where each pixel's run of slots begins if every fragment has one.
+`,dt=`// Where each pixel's run of slots begins if every fragment has one.
 @group(0) @binding(0) var<storage, read> n: array<u32>;                 // [P]
 @group(0) @binding(1) var<storage, read> sums: array<vec2u>;            // [blocks], before each
 @group(0) @binding(2) var<storage, read_write> offsets: array<u32>;     // [P + 1]
@@ -883,7 +883,7 @@ fn place_all(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_inde
         before += here[i];
     }
 }
-`,lt=`// Where each pixel's core begins in the pool. What is left of the budget goes to the pixels that grow at the chosen rank,
+`,ft=`// Where each pixel's core begins in the pool. What is left of the budget goes to the pixels that grow at the chosen rank,
 // by index; the first that does not fit takes what does (renderer/shaders/allocation/place.comp). No run reaches beyond the
 // budget.
 @group(0) @binding(0) var<storage, read> total: array<u32>;            // the last one: fragments granted
@@ -955,7 +955,7 @@ fn place_cuts(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
         before += vec2u(granted, growth);
     }
 }
-`,ut=`// The two pictures beside each other, or what one wants to know of them.
+`,pt=`// The two pictures beside each other, or what one wants to know of them.
 struct Shown {
     split: f32,   // column where the right one begins
     what: u32,    // 0: the picture, 1: k, 2: difference to the exact picture
@@ -1007,7 +1007,7 @@ fn present(@builtin(position) position: vec4f) -> @location(0) vec4f {
     }
     return vec4f(colour, 1.0);
 }
-`,dt=`// The bundle's network on every occupied pixel: what it answers of each bin becomes the rank of the bin's price
+`,mt=`// The bundle's network on every occupied pixel: what it answers of each bin becomes the rank of the bin's price
 // (renderer/shaders/kbuffer-deep/prices.comp and inputs.glsl, allocation/prices.glsl).
 @group(0) @binding(0) var<storage, read_write> words: array<u32>;  // [P][BINS], packed
 @group(0) @binding(1) var<storage, read> state: Cuts;
@@ -1088,7 +1088,7 @@ fn predict_ranks(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
         words[ranks_at(p, i)] = ranks[i];
     }
 }
-`,ft=`// An estimate of the depths between which each tile's fragments lie, at a quarter of the resolution: STEPS pixels across
+`,ht=`// An estimate of the depths between which each tile's fragments lie, at a quarter of the resolution: STEPS pixels across
 // a tile (renderer/shaders/range/range.frag). The near ends are kept inverted, so that cleared buffers begin at zero.
 @group(2) @binding(0) var<storage, read_write> found: array<atomic<u32>>;  // [T][2]
 const STEPS = 2u;
@@ -1112,7 +1112,7 @@ fn find_range(in: Surface) {
     atomicMax(&found[2u * tile], ~bitcast<u32>(depth - reach));
     atomicMax(&found[2u * tile + 1u], bitcast<u32>(depth + reach));
 }
-`,pt=`// The colour of all fragments as one weighted mean, with their total transmittance.
+`,gt=`// The colour of all fragments as one weighted mean, with their total transmittance.
 @group(0) @binding(0) var background: texture_2d<f32>;  // gamma-2 encoded
 @group(0) @binding(1) var sums: texture_2d<f32>;        // sum w C, sum w
 @group(0) @binding(2) var depths: texture_2d<f32>;      // optical depth
@@ -1126,7 +1126,7 @@ fn resolve_blended(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgr
     }
     shown[p] = display_word(tail_over(texel_of(sums, p), texel_of(depths, p).r, texel_of(background, p).rgb), 0u);
 }
-`,mt=`// Slots front to back, then the tail, then the background (renderer/shaders/kbuffer/resolve.frag).
+`,_t=`// Slots front to back, then the tail, then the background (renderer/shaders/kbuffer/resolve.frag).
 @group(0) @binding(0) var<storage, read> offsets: array<u32>;          // [P + 1]
 @group(0) @binding(1) var<storage, read> colours: array<u32>;          // ~ of packed colours; 0: an empty slot
 @group(0) @binding(2) var background: texture_2d<f32>;                 // gamma-2 encoded
@@ -1152,7 +1152,7 @@ fn resolve_chain(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
     let rest = tail_over(texel_of(sums, p), texel_of(depths, p).r, texel_of(background, p).rgb);
     shown[p] = display_word(light.rgb + light.a * rest, k);
 }
-`,ht=`// Each pixel's sorted core front to back, then the tail, then the background (renderer/shaders/kbuffer/resolve.frag).
+`,vt=`// Each pixel's sorted core front to back, then the tail, then the background (renderer/shaders/kbuffer/resolve.frag).
 @group(0) @binding(0) var<storage, read> offsets: array<u32>;          // [P + 1]
 @group(0) @binding(1) var<storage, read> cursors: array<u32>;          // [P], fragments captured
 @group(0) @binding(2) var<storage, read> pool: array<vec2u>;           // packed colour, depth bits
@@ -1175,7 +1175,7 @@ fn resolve_core(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroup
     let rest = tail_over(texel_of(sums, p), texel_of(depths, p).r, texel_of(background, p).rgb);
     shown[p] = display_word(light.rgb + light.a * rest, k);
 }
-`,gt=`// Each pixel's sorted run, composited front to back.
+`,yt=`// Each pixel's sorted run, composited front to back.
 @group(0) @binding(0) var<storage, read> offsets: array<u32>;          // [P + 1]
 @group(0) @binding(1) var<storage, read> pool: array<vec2u>;           // packed colour, depth bits
 @group(0) @binding(2) var background: texture_2d<f32>;                 // gamma-2 encoded
@@ -1194,7 +1194,7 @@ fn resolve_exact(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgrou
     let root = texel_of(background, p).rgb;
     shown[p] = display_word(light.rgb + light.a * root * root, offsets[p + 1u] - offsets[p]);
 }
-`,_t=`// Exclusive prefix sums over the blocks, in place. One work group: each thread has a run of them. Sums stop at CEILING,
+`,bt=`// Exclusive prefix sums over the blocks, in place. One work group: each thread has a run of them. Sums stop at CEILING,
 // so that they are the same in any order.
 @group(0) @binding(0) var<storage, read_write> total: array<u32>;   // its last word gets the sum of the first column
 @group(0) @binding(1) var<storage, read_write> sums: array<vec2u>;  // [blocks]
@@ -1231,7 +1231,7 @@ fn scan(@builtin(local_invocation_index) lane: u32) {
         before = min(before + here, CEILING);
     }
 }
-`,vt=`// The bundle's network on the rows of its manifest's self-test.
+`,xt=`// The bundle's network on the rows of its manifest's self-test.
 @group(0) @binding(0) var<storage, read> features: array<f32>;
 @group(0) @binding(1) var<storage, read_write> answers: array<f32>;
 
@@ -1250,13 +1250,13 @@ fn answer_rows(@builtin(global_invocation_id) id: vec3u) {
         answers[row * DIAPHANE_OUTPUTS + i] = answer.y[i];
     }
 }
-`,yt=`// A fragment in a pool: packed colour, depth bits.
+`,St=`// A fragment in a pool: packed colour, depth bits.
 alias Slot = vec2u;
 
 fn comes_before(one: Slot, two: Slot) -> bool {
     return one.y < two.y || (one.y == two.y && one.x < two.x);
 }
-`,bt=`// Sorts each pixel's run by depth, then colour: heapsort, in place. \`Slot\` is declared before.
+`,Ct=`// Sorts each pixel's run by depth, then colour: heapsort, in place. \`Slot\` is declared before.
 @group(0) @binding(0) var<storage, read> offsets: array<u32>;        // [P + 1]
 @group(0) @binding(1) var<storage, read> cursors: array<u32>;        // [P], fragments captured
 @group(0) @binding(2) var<storage, read_write> pool: array<Slot>;
@@ -1298,7 +1298,7 @@ fn sort_runs(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) 
         pool[base + last - 1u] = farthest;
     }
 }
-`,xt=`// Geometry and shading, shared by every geometry pass: renderer/shaders/common/surface.{vert,glsl} in WGSL.
+`,wt=`// Geometry and shading, shared by every geometry pass: renderer/shaders/common/surface.{vert,glsl} in WGSL.
 struct Material {
     scale: vec4f,    // factor of the texture's linear colour and opacity
     threshold: f32,  // opacity below which nothing is there, and from which on it is opaque; 0: it is blended
@@ -1403,7 +1403,7 @@ fn pack(stored: vec4u) -> u32 {
 fn unpack(word: u32) -> vec4u {
     return vec4u(word, word >> 8u, word >> 16u, word >> 24u) & vec4u(255u);
 }
-`,St=`// A fragment's part of the tail's sums, weighed by what the depth bins know to be in front of it
+`,Tt=`// A fragment's part of the tail's sums, weighed by what the depth bins know to be in front of it
 // (renderer/shaders/kbuffer/tail.glsl). \`words\` and \`ranges\` are declared before.
 struct Tail {
     @location(0) colours: vec4f,  // sum w C, sum w
@@ -1417,10 +1417,10 @@ fn tail_of(p: u32, z: f32, stored: vec4u) -> Tail {
     let weight = fragment.a * exp(-min(in_front(p, place, own), MAX_EXPONENT));
     return Tail(vec4f(weight * fragment.rgb * fragment.rgb, weight), own);
 }
-`,Ct=`// What the tail reads.
+`,Et=`// What the tail reads.
 @group(2) @binding(0) var<storage, read> ranges: array<vec2f>;  // [T]
 @group(2) @binding(1) var<storage, read> words: array<u32>;     // [P][BINS], packed
-`,wt=`// Ranges of tiles that were found in a texture.
+`,Dt=`// Ranges of tiles that were found in a texture.
 @group(0) @binding(0) var tiles: texture_2d<f32>;                     // inverse of the nearest depth, farthest depth
 @group(0) @binding(1) var<storage, read_write> ranges: array<vec2f>;  // [T], nearest and extent
 
@@ -1434,7 +1434,7 @@ fn take_ranges(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups
     let nearest = 1.0 / max(found.x, 1e-9);
     ranges[tile] = vec2f(nearest, max(found.y - nearest, 0.0));
 }
-`,Tt=`// Fragments, occupied pixels and the fullest one's fragments of every block.
+`,Ot=`// Fragments, occupied pixels and the fullest one's fragments of every block.
 @group(0) @binding(0) var<storage, read> n: array<u32>;                       // [P]
 @group(0) @binding(1) var<storage, read_write> blocks: array<vec3u>;
 @group(0) @binding(2) var<storage, read_write> sums: array<vec2u>;            // [blocks], fragments and 0
@@ -1458,16 +1458,16 @@ fn total_blocks(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
         sums[group.x] = vec2u(atomicLoad(&fragments), 0u);
     }
 }
-`;function N(e){let t=Object.hasOwn(k,e)?k[e]:null;return t&&t.bins>0?{name:e,...t}:null}var Et=N(Ce);Object.keys(k).flatMap(e=>N(e)??[]).filter(e=>e.meanLevels>0).reduce((e,t)=>t.bins>e.bins?t:e);var Dt=Object.assign({"./shaders/add_to_bins.wgsl":ke,"./shaders/areas.wgsl":Ae,"./shaders/begin_cuts.wgsl":je,"./shaders/bin_words.wgsl":Me,"./shaders/binned.wgsl":Ne,"./shaders/bins.wgsl":Pe,"./shaders/blended.wgsl":Fe,"./shaders/camera.wgsl":Ie,"./shaders/capture.wgsl":Le,"./shaders/capture_core.wgsl":Re,"./shaders/chain_colour.wgsl":ze,"./shaders/chain_depth.wgsl":Be,"./shaders/choose.wgsl":Ve,"./shaders/core_totals.wgsl":He,"./shaders/count.wgsl":Ue,"./shaders/count_prices.wgsl":We,"./shaders/cover.wgsl":Ge,"./shaders/cut_state.wgsl":Ke,"./shaders/cuts_of_counts.wgsl":qe,"./shaders/difference.wgsl":Je,"./shaders/display.wgsl":Ye,"./shaders/fill_ranges.wgsl":Xe,"./shaders/find_cuts.wgsl":Ze,"./shaders/fixed.wgsl":Qe,"./shaders/gather_bins.wgsl":$e,"./shaders/half_slot.wgsl":et,"./shaders/in_front.wgsl":tt,"./shaders/join.wgsl":nt,"./shaders/kept_bins.wgsl":rt,"./shaders/mipmap.wgsl":it,"./shaders/opaque.wgsl":at,"./shaders/pack.wgsl":ot,"./shaders/pixels.wgsl":st,"./shaders/place_all.wgsl":ct,"./shaders/place_cuts.wgsl":lt,"./shaders/present.wgsl":ut,"./shaders/prices.wgsl":dt,"./shaders/range.wgsl":ft,"./shaders/resolve_blended.wgsl":pt,"./shaders/resolve_chain.wgsl":mt,"./shaders/resolve_core.wgsl":ht,"./shaders/resolve_exact.wgsl":gt,"./shaders/scan.wgsl":_t,"./shaders/self_test.wgsl":vt,"./shaders/slot.wgsl":yt,"./shaders/sort.wgsl":bt,"./shaders/surface.wgsl":xt,"./shaders/tail.wgsl":St,"./shaders/tail_inputs.wgsl":Ct,"./shaders/take_ranges.wgsl":wt,"./shaders/totals.wgsl":Tt}),Ot=2048,kt=2**31-1,At=4096;function jt({bins:e,shareLevels:t,meanLevels:n}){let r={BINS:`${e}u`,FOURS:`${e/4}u`,SHARE_LEVELS:`${t}`,MEAN_LEVELS:`${n}`},i={BLOCK:`${Ot}u`,TURNS:`${At}u`,TEXELS:`11`};return Object.entries({...A,...r,...i}).map(([e,t])=>`const ${e} = ${t};`).join(`
-`)}function P(e,t=Et,n=``){let r=e.map(e=>{let t=Dt[`./shaders/${e}.wgsl`];if(t===void 0)throw Error(`there is no shader ${e}`);return t});return[n,jt(t),...r].join(`
-`)}var Mt=4,Nt=Number(A.RANKS),F=[`cut_state`,`bin_words`,`cuts_of_counts`],Pt=e=>Math.floor(e/Ot)+1;function Ft(e,t){return Math.min(Math.floor(e*t),kt-1)}var It=class{#e;#t;#n;constructor(e){this.#e=e,this.#t=Pt(e.pixels),this.#n=e.gpu.filled(new Uint32Array(4),GPUBufferUsage.UNIFORM)}get offsets(){return this.#e.words(`offsets`,this.#e.pixels+1)}get cuts(){return this.#e.words(`cuts`,this.#e.pixels)}get state(){return this.#e.words(`cut state`,Mt)}get#r(){return this.#e.words(`sums`,2*this.#t)}async totals(e,t){let n=this.#e.words(`counted`,3),r=this.#a(e,t);this.#o(e,[`join`],`join`,[r,n],1),e.submit();let[i,a,o]=await this.#e.gpu.read(n);return[i,a,o]}placeAll(e,t){this.#a(e,t),this.#o(e,[`scan`],`scan`,[this.#e.words(`total`,1),this.#r],1),this.#o(e,[`place_all`],`place_all`,[t,this.#r,this.offsets],this.#t)}placeFixed(e,t){this.#i(t),this.#e.forPixels(e,[`fixed`],`place_fixed`,[this.offsets,this.#n],{threads:this.#e.pixels+1})}begin(e,{tail:t,words:n},r){this.#i(r),e.encoder.clearBuffer(this.state),this.#o(e,[...F,`core_totals`],`total_cores`,[n,this.state],this.#t,t),this.#o(e,[`cut_state`,`begin_cuts`],`begin_cuts`,[this.state,this.#n],1,t)}place(e,{tail:t,words:n}){let r=this.#e.zeros(e,`prices`,Nt),[i,a,o]=[this.state,this.cuts,this.#r];this.#o(e,[...F,`count_prices`],`count_prices`,[n,i,r],this.#t,t),this.#o(e,[`cut_state`,`choose`],`choose`,[i,r,this.#n],1,t),this.#o(e,[...F,`find_cuts`],`find_cuts`,[n,i,a,o],this.#t,t),this.#o(e,[`scan`],`scan`,[i,o],1);let s=[i,a,o,this.offsets,this.#n,n];this.#o(e,[...F,`place_cuts`],`place_cuts`,s,this.#t,t)}destroy(){this.#n.destroy()}#i(e){this.#e.gpu.device.queue.writeBuffer(this.#n,0,new Uint32Array([Math.min(e,kt-1)]))}#a(e,t){let n=this.#e.words(`totals`,4*this.#t);return this.#o(e,[`totals`],`total_blocks`,[t,n,this.#r],this.#t),n}#o(e,t,n,r,i,a){this.#e.dispatch(e,P(t,a),n,r,[i,1])}};function Lt(e,t,n,r){e.forPixels(t,[`bin_words`,`pack`],`pack_bins`,[r],{tail:n})}var Rt=[`cut_state`,`bin_words`,`cuts_of_counts`,`bins`,`kept_bins`,`prices`];function zt(e,t,n,r,i,a,o){let s=[r.words,i.state,a,r.luma,o.createView()],c={tail:n.tail,before:n.wgsl};e.forPixels(t,Rt,`predict_ranks`,s,c)}var Bt=class{gpu;width;height;pixels;#e=new Map;constructor(e,t,n){this.gpu=e,this.width=t,this.height=n,this.pixels=t*n}get bytes(){return[...this.#e.values()].reduce((e,{size:t})=>e+t,0)}destroy(){for(let e of this.#e.values())e.destroy()}words(e,t){let n=this.#e.get(e);if(n&&n.size===4*Math.max(t,1))return n;n?.destroy(),this.#e.delete(e);let r=this.gpu.words(t);return this.#e.set(e,r),r}zeros(e,t,n){let r=this.room(t,n);return e.encoder.clearBuffer(r,0,4*n),r}room(e,t){return this.words(e,Math.max(t,(this.#e.get(e)?.size??0)/4))}forPixels(e,t,n,r,{tail:i=Et,before:a=``,threads:o=this.pixels}={}){this.dispatch(e,P([`pixels`,...t],i,a),n,r,De(o))}dispatch(e,t,n,r,i){let a=this.gpu.compute(t,n),o=e.encoder.beginComputePass();o.setPipeline(a),o.setBindGroup(0,this.gpu.bind(a,r)),o.dispatchWorkgroups(...i),o.end()}},Vt=Number(A.RANGE_TILE),Ht=class{gpu;tail;#e;#t;#n;constructor(e,t,n,r){this.gpu=e,this.tail=r,this.#e=new Bt(e,t,n),this.#t=new It(this.#e),this.#n=Math.ceil(t/Vt)*Math.ceil(n/Vt)}get width(){return this.#e.width}get height(){return this.#e.height}get words(){return this.#e.words(`bins`,this.tail.bins*this.#e.pixels)}get luma(){return this.#e.words(`luma`,this.#e.pixels)}get offsets(){return this.#t.offsets}get cuts(){return this.#t.cuts}get cursors(){return this.#e.words(`cursors`,this.#e.pixels)}slots(e){return Ft(e,this.#e.pixels)}pool(e){return this.#e.room(`pool`,3*Math.max(e,1))}begin(){let e=new M(this.gpu);for(let t of[this.words,this.luma,this.cursors])e.encoder.clearBuffer(t);e.submit()}select(e,t,n,r){let{tail:i,words:a,luma:o}=this,s=new M(this.gpu),c=this.#e.words(`ranges`,2*this.#n),l=this.#n;this.#e.forPixels(s,[`take_ranges`],`take_ranges`,[n.createView(),c],{threads:l}),Lt(this.#e,s,i,a);let u={tail:i,words:a,luma:o};this.#t.begin(s,u,t),zt(this.#e,s,e,u,this.#t,c,r),this.#t.place(s,u),s.submit()}sort(e){let t=new M(this.gpu);this.#e.forPixels(t,[`half_slot`,`sort`],`sort_runs`,[this.offsets,this.cursors,this.pool(e)]),t.submit()}get bytes(){return this.#e.bytes}destroy(){this.#e.destroy(),this.#t.destroy()}},Ut=Number(A.MOST_OPACITY);function I(e){return e.transparent&&e.blending===1&&!Wt(e)}function Wt(e){let{transmission:t,transmissionNode:n,backdropNode:r}=e;return(t??0)>0||!!n||!!r}var L=i.a.clamp(0,1).toVar(),R=y(e=>e.material.premultipliedAlpha?i.rgb.div(i.a.max(1e-6)):Se(i.rgb))(),z=L.oneMinus().max(Math.exp(-Ut)).log().negate().toVar(),Gt=class{#e=o(0);#t=o(1);here=de.z.negate().add(this.#e).div(this.#t).max(1e-6).toVar();of(e){return Math.max((e+this.#e.value)/this.#t.value,1e-6)}update(e){let{near:t,far:n}=e,r=e.isOrthographicCamera===!0;this.#e.value=r?(n-t)/1024-t:0,this.#t.value=Math.sqrt((t+this.#e.value)*(n+this.#e.value))}},B=new WeakMap;function Kt(e){let t=e.contextNode,n=B.get(t);if(!n){let{getAO:e}=t.getFlowContextData();n=xe(t,{getAO:e??(e=>e)}),B.set(t,n)}return n}function V(e,t){let{_objects:n,_renderContexts:r}=e,i=({mrt:e})=>e!==null&&t.has(e);for(let e of[...n?._renderObjects??[]])i(e.context)&&e.dispose();let a=r?._renderContexts??{};for(let[e,t]of Object.entries(a))i(t)&&delete a[e]}function H(t){let n=new e(1,1,{count:t.length,depthBuffer:!1,samples:0});return t.forEach(({name:e,format:t=re,type:r=me},i)=>{let a=n.textures[i];Object.assign(a,{name:e,format:t,type:r,minFilter:l,magFilter:l}),a.generateMipmaps=!1}),n}function U(e,t=!1){let n=new ge(5);n.blendSrc=n.blendDst=201,n.blendEquation=t?104:100;let r=a(e);for(let t of Object.keys(e))r.setBlendMode(t,n).setClearColor(t,0,0);return r}var W=class{material=new oe;#e=new ve(this.material);constructor(e){this.material.fragmentNode=e,this.material.depthTest=this.material.depthWrite=!1}render(e,t){let{opaque:n,autoClear:r}=e,i=e.getRenderObjectFunction();Object.assign(e,{opaque:!0,autoClear:!1}),e.setRenderObjectFunction(null),e.setRenderTarget(t),this.#e.render(e),e.setRenderObjectFunction(i),Object.assign(e,{opaque:n,autoClear:r})}dispose(){this.material.dispose()}};function G(e){let t=new W(e);return Object.assign(t.material,{blending:5,blendSrc:201,blendDst:205}),t}var[K,qt,Jt,Yt,Xt,Zt]=[`OPTICAL_UNIT`,`ROOT_SHARE`,`PLAIN_SHARE`,`MAX_EXPONENT`,`LEAST_OTHERS`,`LEAST_SPREAD`].map(e=>Number(A[e])),q=Math.min(...Object.values(k).flatMap(({bins:e,meanLevels:t})=>t>0?[e]:[])),Qt=2048,J=Array.from({length:q/4},(e,t)=>t),$t=class{target;#e;#t;#n;#r;constructor(e,t){this.target=H([...J.map(e=>({name:`units${e}`})),...J.map(e=>({name:`moments${e}`}))]);let n=t.y.sub(t.x),r=n.greaterThan(0).select(e.sub(t.x).div(n.max(1e-12)).clamp(0,1),h(0)),i=r.mul(Jt).add(r.sqrt().mul(qt)).mul(q).toVar();this.#e=i.floor().min(q-1).toVar(),this.#t=i.sub(this.#e).toVar(),this.#r=L.greaterThan(0).select(z.mul(K).add(.5).floor().clamp(1,Qt),h(0)).toVar(),this.#n=this.#r.mul(this.#t).add(.5).floor().toVar()}outputs(e=h(1)){let t={};for(let n of J)t[`units${n}`]=this.#a(n).mul(this.#r).mul(e),t[`moments${n}`]=this.#a(n).mul(this.#n).mul(e);return t}get weight(){let e=(e,t)=>J.map(n=>this.#i(`${e}${n}`).dot(t(n))).reduce((e,t)=>e.add(t)).toVar(),t=e(`units`,e=>this.#o(e)).div(K),n=e(`units`,e=>this.#a(e)).div(K),r=e(`moments`,e=>this.#a(e)).div(K),i=n.sub(z).max(0).toVar(),a=r.sub(z.mul(this.#t)).div(i.max(Xt)).clamp(0,1),o=i.greaterThan(Xt).select(a,h(.5)).toVar(),s=o.min(o.oneMinus()).max(Zt).toVar(),c=this.#t.sub(o).add(s).div(s.mul(2)).clamp(0,1);return L.mul(t.add(i.mul(c)).min(Yt).negate().exp())}#i(e){return f(this.target.textures.find(t=>t.name===e),C).level(O(0))}#a(e){return this.#s(e).sub(this.#e).abs().oneMinus().clamp(0,1)}#o(e){return n(this.#e).sub(this.#s(e)).clamp(0,1)}#s(e){return n(4*e,4*e+1,4*e+2,4*e+3)}},en=8,Y=()=>new x(new Uint32Array(1),1),X=class{depth;visible;#e=o(1,`uint`);#t=o(1,`uint`);#n=[Y(),Y(),Y()].map(e=>d(e,`uint`,1).toAtomic());#r=1;constructor(e,t){this.depth=e,this.visible=t}static bytes(e,t,n){return 4*e*t*n}resize(e,t,n){[this.#t.value,this.#e.value]=[e,n];let r=Math.max(e*t*n,1);if(r!==this.#r){this.#r=r;for(let e of this.#n)e.value.dispose(),e.value=new x(new Uint32Array(r),1)}}release(){this.resize(0,0,0)}inserting(e){let[t]=this.#n;return y(()=>{let r=n(e).toVar(),i=this.#a.toVar(),a=this.#i.toVar();return E(this.visible.is,()=>{this.#o(e=>{let n=w(t.element(i.add(e)),a).toVar();a.assign(n.lessThan(a).select(n,a)),E(a.equal(p(0)),()=>void S())})}),r})()}get remaining(){let[e,t,n]=this.#n;return y(()=>{let r=this.visible.share.toVar(),i=R.max(0).min(65504).toVar(),a=this.#a.toVar(),o=this.#i.add(p(en)).toVar(),s=p(0).toVar();return E(this.visible.is,()=>{this.#o(t=>{E(D(e.element(a.add(t))).lessThanEqual(o),()=>void S()),s.addAssign(p(1))}),E(s.lessThan(this.#e),()=>{r.assign(0);let e=a.add(s);w(t.element(e),ee(i.rg)),w(n.element(e),ee(m(i.b,L)))})}),r})().toVar()}over(e){let[t,r,i]=this.#n;return y(()=>{let a=this.#a.toVar(),o=Se(0).toVar(),s=h(1).toVar();return this.#o(e=>{let l=a.add(e),u=c(D(r.element(l))),d=c(D(i.element(l))).toVar();o.addAssign(n(u,d.x,0).rgb.mul(s.mul(d.y))),s.mulAssign(d.y.oneMinus());for(let e of[t,r,i])ce(e.element(l),p(0))}),o.addAssign(e.rgb.mul(s)),n(o,s.mul(e.a.oneMinus()).oneMinus())})()}dispose(){for(let e of this.#n)e.value.dispose()}get#i(){return p(2139095040).sub(r(this.depth))}get#a(){return p(t.y).mul(this.#t).add(p(t.x)).mul(this.#e)}#o(e){_e({start:p(0),end:this.#e,type:`uint`,condition:`<`},({i:t})=>e(t))}},tn=[`words`,`luma`,`offsets`,`cuts`,`cursors`,`pool`],nn=`fn diaphane_gather(p: u32, z: f32, range: vec2f, own: f32, rgb: vec3u) -> f32 {
+`;function N(e){let t=Object.hasOwn(k,e)?k[e]:null;return t&&t.bins>0?{name:e,...t}:null}var P=N(Ee);Object.keys(k).flatMap(e=>N(e)??[]).filter(e=>e.meanLevels>0).reduce((e,t)=>t.bins>e.bins?t:e);var kt=Object.assign({"./shaders/add_to_bins.wgsl":Me,"./shaders/areas.wgsl":Ne,"./shaders/begin_cuts.wgsl":Pe,"./shaders/bin_words.wgsl":Fe,"./shaders/binned.wgsl":Ie,"./shaders/bins.wgsl":Le,"./shaders/blended.wgsl":Re,"./shaders/camera.wgsl":ze,"./shaders/capture.wgsl":Be,"./shaders/capture_core.wgsl":Ve,"./shaders/chain_colour.wgsl":He,"./shaders/chain_depth.wgsl":Ue,"./shaders/choose.wgsl":We,"./shaders/core_totals.wgsl":Ge,"./shaders/count.wgsl":Ke,"./shaders/count_prices.wgsl":qe,"./shaders/cover.wgsl":Je,"./shaders/cut_state.wgsl":Ye,"./shaders/cuts_of_counts.wgsl":Xe,"./shaders/difference.wgsl":Ze,"./shaders/display.wgsl":Qe,"./shaders/fill_ranges.wgsl":$e,"./shaders/find_cuts.wgsl":et,"./shaders/fixed.wgsl":tt,"./shaders/gather_bins.wgsl":nt,"./shaders/half_slot.wgsl":rt,"./shaders/in_front.wgsl":it,"./shaders/join.wgsl":at,"./shaders/kept_bins.wgsl":ot,"./shaders/mipmap.wgsl":st,"./shaders/opaque.wgsl":ct,"./shaders/pack.wgsl":lt,"./shaders/pixels.wgsl":ut,"./shaders/place_all.wgsl":dt,"./shaders/place_cuts.wgsl":ft,"./shaders/present.wgsl":pt,"./shaders/prices.wgsl":mt,"./shaders/range.wgsl":ht,"./shaders/resolve_blended.wgsl":gt,"./shaders/resolve_chain.wgsl":_t,"./shaders/resolve_core.wgsl":vt,"./shaders/resolve_exact.wgsl":yt,"./shaders/scan.wgsl":bt,"./shaders/self_test.wgsl":xt,"./shaders/slot.wgsl":St,"./shaders/sort.wgsl":Ct,"./shaders/surface.wgsl":wt,"./shaders/tail.wgsl":Tt,"./shaders/tail_inputs.wgsl":Et,"./shaders/take_ranges.wgsl":Dt,"./shaders/totals.wgsl":Ot}),At=2048,jt=2**31-1,Mt=4096;function Nt({bins:e,shareLevels:t,meanLevels:n}){let r={BINS:`${e}u`,FOURS:`${e/4}u`,SHARE_LEVELS:`${t}`,MEAN_LEVELS:`${n}`},i={BLOCK:`${At}u`,TURNS:`${Mt}u`,TEXELS:`11`};return Object.entries({...A,...r,...i}).map(([e,t])=>`const ${e} = ${t};`).join(`
+`)}function F(e,t=P,n=``){let r=e.map(e=>{let t=kt[`./shaders/${e}.wgsl`];if(t===void 0)throw Error(`there is no shader ${e}`);return t});return[n,Nt(t),...r].join(`
+`)}var Pt=4,Ft=Number(A.RANKS),I=[`cut_state`,`bin_words`,`cuts_of_counts`],It=e=>Math.floor(e/At)+1;function Lt(e,t){return Math.min(Math.floor(e*t),jt-1)}var Rt=class{#e;#t;#n;constructor(e){this.#e=e,this.#t=It(e.pixels),this.#n=e.gpu.filled(new Uint32Array(4),GPUBufferUsage.UNIFORM)}get offsets(){return this.#e.words(`offsets`,this.#e.pixels+1)}get cuts(){return this.#e.words(`cuts`,this.#e.pixels)}get state(){return this.#e.words(`cut state`,Pt)}get#r(){return this.#e.words(`sums`,2*this.#t)}async totals(e,t){let n=this.#e.words(`counted`,3),r=this.#a(e,t);this.#o(e,[`join`],`join`,[r,n],1),e.submit();let[i,a,o]=await this.#e.gpu.read(n);return[i,a,o]}placeAll(e,t){this.#a(e,t),this.#o(e,[`scan`],`scan`,[this.#e.words(`total`,1),this.#r],1),this.#o(e,[`place_all`],`place_all`,[t,this.#r,this.offsets],this.#t)}placeFixed(e,t){this.#i(t),this.#e.forPixels(e,[`fixed`],`place_fixed`,[this.offsets,this.#n],{threads:this.#e.pixels+1})}begin(e,{tail:t,words:n},r){this.#i(r),e.encoder.clearBuffer(this.state),this.#o(e,[...I,`core_totals`],`total_cores`,[n,this.state],this.#t,t),this.#o(e,[`cut_state`,`begin_cuts`],`begin_cuts`,[this.state,this.#n],1,t)}place(e,{tail:t,words:n}){let r=this.#e.zeros(e,`prices`,Ft),[i,a,o]=[this.state,this.cuts,this.#r];this.#o(e,[...I,`count_prices`],`count_prices`,[n,i,r],this.#t,t),this.#o(e,[`cut_state`,`choose`],`choose`,[i,r,this.#n],1,t),this.#o(e,[...I,`find_cuts`],`find_cuts`,[n,i,a,o],this.#t,t),this.#o(e,[`scan`],`scan`,[i,o],1);let s=[i,a,o,this.offsets,this.#n,n];this.#o(e,[...I,`place_cuts`],`place_cuts`,s,this.#t,t)}destroy(){this.#n.destroy()}#i(e){this.#e.gpu.device.queue.writeBuffer(this.#n,0,new Uint32Array([Math.min(e,jt-1)]))}#a(e,t){let n=this.#e.words(`totals`,4*this.#t);return this.#o(e,[`totals`],`total_blocks`,[t,n,this.#r],this.#t),n}#o(e,t,n,r,i,a){this.#e.dispatch(e,F(t,a),n,r,[i,1])}};function zt(e,t,n,r){e.forPixels(t,[`bin_words`,`pack`],`pack_bins`,[r],{tail:n})}var Bt=[`cut_state`,`bin_words`,`cuts_of_counts`,`bins`,`kept_bins`,`prices`];function Vt(e,t,n,r,i,a,o){let s=[r.words,i.state,a,r.luma,o.createView()],c={tail:n.tail,before:n.wgsl};e.forPixels(t,Bt,`predict_ranks`,s,c)}var Ht=class{gpu;width;height;pixels;#e=new Map;constructor(e,t,n){this.gpu=e,this.width=t,this.height=n,this.pixels=t*n}get bytes(){return[...this.#e.values()].reduce((e,{size:t})=>e+t,0)}destroy(){for(let e of this.#e.values())e.destroy()}words(e,t){let n=this.#e.get(e);if(n&&n.size===4*Math.max(t,1))return n;n?.destroy(),this.#e.delete(e);let r=this.gpu.words(t);return this.#e.set(e,r),r}zeros(e,t,n){let r=this.room(t,n);return e.encoder.clearBuffer(r,0,4*n),r}room(e,t){return this.words(e,Math.max(t,(this.#e.get(e)?.size??0)/4))}forPixels(e,t,n,r,{tail:i=P,before:a=``,threads:o=this.pixels}={}){this.dispatch(e,F([`pixels`,...t],i,a),n,r,Ae(o))}dispatch(e,t,n,r,i){let a=this.gpu.compute(t,n),o=e.encoder.beginComputePass();o.setPipeline(a),o.setBindGroup(0,this.gpu.bind(a,r)),o.dispatchWorkgroups(...i),o.end()}},Ut=Number(A.RANGE_TILE),Wt=class{gpu;tail;#e;#t;#n;constructor(e,t,n,r){this.gpu=e,this.tail=r,this.#e=new Ht(e,t,n),this.#t=new Rt(this.#e),this.#n=Math.ceil(t/Ut)*Math.ceil(n/Ut)}get width(){return this.#e.width}get height(){return this.#e.height}get words(){return this.#e.words(`bins`,this.tail.bins*this.#e.pixels)}get luma(){return this.#e.words(`luma`,this.#e.pixels)}get offsets(){return this.#t.offsets}get cuts(){return this.#t.cuts}get cursors(){return this.#e.words(`cursors`,this.#e.pixels)}slots(e){return Lt(e,this.#e.pixels)}pool(e){return this.#e.room(`pool`,3*Math.max(e,1))}begin(){let e=new M(this.gpu);for(let t of[this.words,this.luma,this.cursors])e.encoder.clearBuffer(t);e.submit()}select(e,t,n,r){let{tail:i,words:a,luma:o}=this,s=new M(this.gpu),c=this.#e.words(`ranges`,2*this.#n),l=this.#n;this.#e.forPixels(s,[`take_ranges`],`take_ranges`,[n.createView(),c],{threads:l}),zt(this.#e,s,i,a);let u={tail:i,words:a,luma:o};this.#t.begin(s,u,t),Vt(this.#e,s,e,u,this.#t,c,r),this.#t.place(s,u),s.submit()}sort(e){let t=new M(this.gpu);this.#e.forPixels(t,[`half_slot`,`sort`],`sort_runs`,[this.offsets,this.cursors,this.pool(e)]),t.submit()}get bytes(){return this.#e.bytes}destroy(){this.#e.destroy(),this.#t.destroy()}},Gt=Number(A.MOST_OPACITY);function L(e){return e.transparent&&e.blending===1&&!Kt(e)}function Kt(e){let{transmission:t,transmissionNode:n,backdropNode:r}=e;return(t??0)>0||!!n||!!r}var R=i.a.clamp(0,1).toVar(),z=_(e=>e.material.premultipliedAlpha?i.rgb.div(i.a.max(1e-6)):D(i.rgb))(),B=R.oneMinus().max(Math.exp(-Gt)).log().negate().toVar(),qt=class{#e=o(0);#t=o(1);here=fe.z.negate().add(this.#e).div(this.#t).max(1e-6).toVar();of(e){return Math.max((e+this.#e.value)/this.#t.value,1e-6)}update(e){let{near:t,far:n}=e,r=e.isOrthographicCamera===!0;this.#e.value=r?(n-t)/1024-t:0,this.#t.value=Math.sqrt((t+this.#e.value)*(n+this.#e.value))}},Jt=new WeakMap;function Yt(e){let t=e.contextNode,n=Jt.get(t);if(!n){let{getAO:e}=t.getFlowContextData();n=Te(t,{getAO:e??(e=>e)}),Jt.set(t,n)}return n}function Xt(e,t){let{_objects:n,_renderContexts:r}=e,i=({mrt:e})=>e!==null&&t.has(e);for(let e of[...n?._renderObjects??[]])i(e.context)&&e.dispose();let a=r?._renderContexts??{};for(let[e,t]of Object.entries(a))i(t)&&delete a[e]}function V(t){let n=new ge(1,1,{count:t.length,depthBuffer:!1,samples:0});return t.forEach(({name:t,format:r=e,type:i=he},a)=>{let o=n.textures[a];Object.assign(o,{name:t,format:r,type:i,minFilter:O,magFilter:O}),o.generateMipmaps=!1}),n}function H(e,t=!1){let n=new _e(5);n.blendSrc=n.blendDst=201,n.blendEquation=t?104:100;let r=a(e);for(let t of Object.keys(e))r.setBlendMode(t,n).setClearColor(t,0,0);return r}var U=class{material=new se;#e=new xe(this.material);constructor(e){this.material.fragmentNode=e,this.material.depthTest=this.material.depthWrite=!1}render(e,t){let{opaque:n,autoClear:r}=e,i=e.getRenderObjectFunction();Object.assign(e,{opaque:!0,autoClear:!1}),e.setRenderObjectFunction(null),e.setRenderTarget(t),this.#e.render(e),e.setRenderObjectFunction(i),Object.assign(e,{opaque:n,autoClear:r})}dispose(){this.material.dispose()}};function W(e){let t=new U(e);return Object.assign(t.material,{blending:5,blendSrc:201,blendDst:205}),t}var[G,Zt,Qt,$t,en,tn]=[`OPTICAL_UNIT`,`ROOT_SHARE`,`PLAIN_SHARE`,`MAX_EXPONENT`,`LEAST_OTHERS`,`LEAST_SPREAD`].map(e=>Number(A[e])),K=Math.min(...Object.values(k).flatMap(({bins:e,meanLevels:t})=>t>0?[e]:[])),nn=2048,q=Array.from({length:K/4},(e,t)=>t),rn=class{target;#e;#t;#n;#r;constructor(e,t){this.target=V([...q.map(e=>({name:`units${e}`})),...q.map(e=>({name:`moments${e}`}))]);let n=t.y.sub(t.x),r=n.greaterThan(0).select(e.sub(t.x).div(n.max(1e-12)).clamp(0,1),g(0)),i=r.mul(Qt).add(r.sqrt().mul(Zt)).mul(K).toVar();this.#e=i.floor().min(K-1).toVar(),this.#t=i.sub(this.#e).toVar(),this.#r=R.greaterThan(0).select(B.mul(G).add(.5).floor().clamp(1,nn),g(0)).toVar(),this.#n=this.#r.mul(this.#t).add(.5).floor().toVar()}outputs(e){let t={};for(let n of q)t[`units${n}`]=this.#a(n).mul(this.#r).mul(e),t[`moments${n}`]=this.#a(n).mul(this.#n).mul(e);return t}get weight(){let e=(e,t)=>q.map(n=>this.#i(`${e}${n}`).dot(t(n))).reduce((e,t)=>e.add(t)).toVar(),t=e(`units`,e=>this.#o(e)).div(G),n=e(`units`,e=>this.#a(e)).div(G),r=e(`moments`,e=>this.#a(e)).div(G),i=n.sub(B).max(0).toVar(),a=r.sub(B.mul(this.#t)).div(i.max(en)).clamp(0,1),o=i.greaterThan(en).select(a,g(.5)).toVar(),s=o.min(o.oneMinus()).max(tn).toVar(),c=this.#t.sub(o).add(s).div(s.mul(2)).clamp(0,1);return R.mul(t.add(i.mul(c)).min($t).negate().exp())}#i(e){return p(this.target.textures.find(t=>t.name===e),S).level(E(0))}#a(e){return this.#s(e).sub(this.#e).abs().oneMinus().clamp(0,1)}#o(e){return n(this.#e).sub(this.#s(e)).clamp(0,1)}#s(e){return n(4*e,4*e+1,4*e+2,4*e+3)}},an=8,J=()=>new x(new Uint32Array(1),1),on=class{depth;visible;#e=o(1,`uint`);#t=o(1,`uint`);#n=[J(),J(),J()].map(e=>f(e,`uint`,1).toAtomic());#r=1;constructor(e,t){this.depth=e,this.visible=t}static bytes(e,t,n){return 4*e*t*n}resize(e,t,n){[this.#t.value,this.#e.value]=[e,n];let r=Math.max(e*t*n,1);if(r!==this.#r){this.#r=r;for(let e of this.#n)e.value.dispose(),e.value=new x(new Uint32Array(r),1)}}release(){this.resize(0,0,0)}inserting(e){let[t]=this.#n;return _(()=>{let r=n(e).toVar(),i=this.#a.toVar(),a=this.#i.toVar();return w(this.visible.is,()=>{this.#o(e=>{let n=C(t.element(i.add(e)),a).toVar();a.assign(n.lessThan(a).select(n,a)),w(a.equal(m(0)),()=>void de())})}),r})()}get remaining(){let[e,t,n]=this.#n;return _(()=>{let r=this.visible.share.toVar(),i=z.max(0).min(65504).toVar(),a=this.#a.toVar(),o=this.#i.add(m(an)).toVar(),s=m(0).toVar();return w(this.visible.is,()=>{this.#o(t=>{w(T(e.element(a.add(t))).lessThanEqual(o),()=>void de()),s.addAssign(m(1))}),w(s.lessThan(this.#e),()=>{r.assign(0);let e=a.add(s);C(t.element(e),ee(i.rg)),C(n.element(e),ee(h(i.b,R)))})}),r})().toVar()}over(e){let[t,r,i]=this.#n;return _(()=>{let a=this.#a.toVar(),o=D(0).toVar(),s=g(1).toVar();return this.#o(e=>{let c=a.add(e),u=l(T(r.element(c))),d=l(T(i.element(c))).toVar();o.addAssign(n(u,d.x,0).rgb.mul(s.mul(d.y))),s.mulAssign(d.y.oneMinus());for(let e of[t,r,i])ue(e.element(c),m(0))}),o.addAssign(e.rgb.mul(s)),n(o,s.mul(e.a.oneMinus()).oneMinus())})()}dispose(){for(let e of this.#n)e.value.dispose()}get#i(){return m(2139095040).sub(r(this.depth))}get#a(){return m(t.y).mul(this.#t).add(m(t.x)).mul(this.#e)}#o(e){ve({start:m(0),end:this.#e,type:`uint`,condition:`<`},({i:t})=>e(t))}},sn=[`words`,`luma`,`offsets`,`cuts`,`cursors`,`pool`],cn=`fn diaphane_gather(p: u32, z: f32, range: vec2f, own: f32, rgb: vec3u) -> f32 {
     let place = bin_place(z, range);
     let bin = bin_of(place);
     let units = units_in(own);
     add_to_bin(BINS * p + bin, units, u32(f32(units) * (place - f32(bin)) + 0.5));
     add_luma(p, units, rgb);
     return 0.0;
-}`,rn=`fn diaphane_capture(p: u32, z: f32, range: vec2f, rgb: vec3f, a: f32) -> f32 {
+}`,ln=`fn diaphane_capture(p: u32, z: f32, range: vec2f, rgb: vec3f, a: f32) -> f32 {
     if (bin_of(bin_place(z, range)) < cuts[p]) {
         let at = offsets[p] + atomicAdd(&cursors[p], 1u);
         if (at < offsets[p + 1u]) {
@@ -1478,9 +1478,9 @@ fn total_blocks(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
         }
     }
     return 1.0;
-}`,an=`fn diaphane_weight(p: u32, z: f32, range: vec2f, own: f32, a: f32) -> f32 {
+}`,un=`fn diaphane_weight(p: u32, z: f32, range: vec2f, own: f32, a: f32) -> f32 {
     return a * exp(-min(in_front(p, bin_place(z, range), own), MAX_EXPONENT));
-}`,on=`fn diaphane_resolve(p: u32) -> vec4f {
+}`,dn=`fn diaphane_resolve(p: u32) -> vec4f {
     var light = vec4f(0.0, 0.0, 0.0, 1.0);
     let k = min(cursors[p], offsets[p + 1u] - offsets[p]);
     for (var i = offsets[p]; i < offsets[p] + k; i++) {
@@ -1489,4 +1489,4 @@ fn total_blocks(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
         light = vec4f(light.rgb + light.a * ba.y * vec3f(rg, ba.x), light.a * (1.0 - ba.y));
     }
     return light;
-}`,Z=e=>e.replace(/\b(words|luma|offsets|cuts|cursors|pool)\[/g,`diaphane_$1.value[`),sn=class{renderer;gpu;bins;range;tail;visible;picture;#e=o(1,`uint`);#t=[];#n=new Map;#r=H([{name:`background`,type:he}]);#i;#a;#o;#s;#c=null;#l=0;constructor(e,t,r,i,a,o,s,c){this.renderer=e,this.gpu=t,this.bins=r,this.range=a,this.tail=o,this.visible=s,this.picture=c;let l=f(c.texture,C).level(O(0)).rgb;this.#i=new W(n(l.clamp(0,1).sqrt(),1)),this.#a=this.#p(i),this.#o=this.#m(i),this.#s=this.#h()}static bytes(e,t,{bins:n}){return 4*Math.max(n*e,3*Math.floor(t*e))}get bytes(){return this.#c?.bytes??0}get slots(){return this.#l}async offsets(){return this.#c?this.gpu.read(this.#c.offsets):new Uint32Array(1)}render(e,t,n){let r=this.#u();this.#l=r.slots(t),this.#d(r),r.begin(),n(this.tail.target,this.#a),this.#i.render(this.renderer,this.#r);let[i,a]=[this.range.tiles,this.#r].map(e=>this.#f(e));r.select(e,this.#l,i,a),n(this.tail.target,this.#o),r.sort(this.#l),this.#s.render(this.renderer,this.picture)}release(){for(let{attribute:e}of this.#n.values())e.dispose();this.#n.clear(),this.#c?.destroy(),this.#c=null,this.#r.dispose()}dispose(){this.release(),V(this.renderer,new Set([this.#a,this.#o])),this.#i.dispose(),this.#s.dispose()}#u(){let{width:e,height:t}=this.picture;return(this.#c?.width!==e||this.#c.height!==t)&&this.release(),this.#r.setSize(e,t),this.#e.value=e,this.#c??=new Ht(this.gpu,e,t,this.bins)}#d(e){for(let t of tn){let n=t===`pool`?e.pool(this.#l):e[t],r=this.#n.get(t);if(r?.buffer===n)continue;r?.attribute.dispose();let i=new x(new Uint32Array(1),1);cn(this.renderer,i).buffer=n,this.#n.set(t,{buffer:n,attribute:i});for(let e of this.#t)e.name===t&&(e.node.value=i)}}#f(e){return cn(this.renderer,e.texture).texture}#p(e){let t=this.#g([`bins`,`bin_words`,`add_to_bins`],{words:!0,luma:!0}),r=g(nn,[t]);return U({mean:y(()=>{let t=h(0).toVar(),i=this.#_.toVar(),a=u(R.clamp(0,1).sqrt().mul(255).add(.5)).toVar(),[o,s]=[e.toVar(),z.toVar()];return E(this.visible.is,()=>void t.assign(r(this.#v,o,i,s,a))),n(t)})(),depth:n(0)})}#m(e){let t=this.#g([`bins`,`bin_words`,`kept_bins`,`in_front`],{words:!1}),n=this.#g([],{offsets:!1,cuts:!1,cursors:!0,pool:!0}),[r,i]=[g(Z(rn),[t,n]),g(an,[t])],a=this.#_.toVar(),o=y(()=>{let t=this.visible.share.toVar(),n=R.max(0).min(65504).toVar(),i=e.toVar();return E(this.visible.is,()=>void t.assign(r(this.#v,i,a,n,L))),t})().toVar(),s=i(this.#v,e,a,z,L);return this.tail.mrt(s,o)}#h(){let e=this.#g([],{offsets:!1,cursors:!1,pool:!1}),t=g(Z(on),[e])(this.#v).toVar(),r=this.tail.picture.toVar();return G(n(t.rgb.add(r.rgb.mul(t.a)),t.a.mul(r.a.oneMinus()).oneMinus()))}#g(e,t){let n=Object.entries(t).map(([e,t])=>{let n=d(new x(new Uint32Array(1),1),`uint`,1).setName(`diaphane_${e}`),r=t?n.toAtomic():n.toReadOnly();return this.#t.push({name:e,node:r}),r});return ye(e.length?Z(P(e,this.bins)):``,n)}get#_(){let{here:e}=this.range;return m(e.x,e.y.sub(e.x).max(0))}get#v(){return p(t.y).mul(this.#e).add(p(t.x))}};function cn(e,t){return e.backend.get(t)}var ln=Number(A.RANGE_TILE),Q=2,$=`range`,un=class{depth;target;tiles;#e;#t=o(new T(1,1));#n=o(new T(0,0));#r=new pe;#i=new le;mrt;here;constructor(e,t){this.depth=e;let r=t?ue:me,i=t?1e-6:2**-10;this.target=H([{name:$,format:_,type:r}]),this.tiles=H([{name:$,format:_,type:r}]);let a=e.here,o=ae(a).abs().add(be(a).abs()).div(2).min(a.div(20)),[s,c]=[a.sub(o).max(1e-6),a.add(o)];this.mrt=U({[$]:n(h(1).div(s).mul(1+i),c.mul(1+i),0,0)},!0),this.#e=new W(this.#a());let l=f(this.tiles.texture,C).level(O(0)).rg;this.here=m(h(1).div(l.x.max(1e-9)),l.y).toVar()}#a(){let e=(e,t)=>f(this.target.texture,C.add(m(e,t).div(this.#t).div(Q))).level(O(0)).rg,t=(t,n)=>{let r=m(0);for(let i=t;i<n;i++)for(let a=t;a<n;a++)r=r.max(e(a+.5,i+.5));return r.toVar()},[r,i]=[t(-1,1),t(-3,3)],a=i.y.greaterThan(0).select(i,this.#n);return n(r.y.greaterThan(0).select(r,a),0,0)}setSize(e,t){let[n,r]=[Math.ceil(e/ln),Math.ceil(t/ln)];this.target.setSize(Q*n,Q*r),this.tiles.setSize(n,r),this.#t.value.set(n,r)}begin(){this.#n.value.set(0,0)}cover(e,t){let{geometry:n}=e;n&&!n.boundingSphere&&n.computeBoundingSphere();let r=e.boundingSphere??n?.boundingSphere,[i,a]=[t.near,t.far];if(r&&e.frustumCulled){let{center:n,radius:o}=this.#r.copy(r).applyMatrix4(e.matrixWorld),s=-this.#i.copy(n).applyMatrix4(t.matrixWorldInverse).z;[i,a]=[Math.max(i,s-o),Math.min(a,s+o)]}let{value:o}=this.#n;o.set(Math.max(o.x,1/this.depth.of(i)),Math.max(o.y,this.depth.of(a)))}fill(e){this.#e.render(e,this.tiles)}dispose(){this.target.dispose(),this.tiles.dispose(),this.#e.dispose()}},dn=class{target=H([{name:`mean`},{name:`depth`,format:te}]);mrt(e,t){return U({mean:n(R,1).mul(e.mul(t)),depth:n(z.mul(t),0,0,0)})}get picture(){let[e,t]=this.target.textures.map(e=>f(e,C).level(O(0))),r=t.r.negate().exp().oneMinus();return n(e.rgb.div(e.a.max(1e-9)).mul(r),r)}},fn=2**-22,pn=class{is;share;constructor(e){let t=f(e.depthTexture,C).level(O(0)).r;this.is=y(e=>{if(!e.material.depthTest)return L.greaterThan(0);let n=(e.camera.isOrthographicCamera===!0?ne:s)(de.z,ie,se);return L.greaterThan(0).and(n.lessThanEqual(t.add(fn)))})().toVar(),this.share=this.is.select(h(1),h(0)).toVar()}},mn=class{renderer;picture;#e=new Gt;#t;#n;#r=new dn;#i;#a;#o=null;#s=null;#c=null;#l=1;#u=1;#d=``;constructor(e,t){this.renderer=e,this.picture=t,this.#t=new un(this.#e,hn(e)),this.#a=new pn(t),this.#n=new $t(this.#e.here,this.#t.here),this.#n.target.depthTexture=this.#r.target.depthTexture=t.depthTexture,this.#i={bins:U(this.#n.outputs()),tail:this.#r.mrt(this.#n.weight,h(1)),over:G(this.#r.picture)},this.setSize(t.width,t.height)}setSize(e,t){this.#t.setSize(e,t),this.#n.target.setSize(e,t),this.#r.target.setSize(e,t),[this.#l,this.#u]=[e,t]}begin(e){this.#e.update(e),this.#t.begin()}cover(e,t){this.#t.cover(e,t)}get deep(){return this.#s}render(e,t){let{technique:n,budget:r,bundle:i}=this.#h(e);if(n!==`kbuffer`&&this.#o?.slots.release(),n!==`kbuffer-deep`&&this.#s?.release(),t(this.#t.target,this.#t.mrt),this.#t.fill(this.renderer),n===`kbuffer-deep`)return this.#m(i).render(i,r,t);let{bins:a,tail:o,over:s}=n===`kbuffer`?this.#f(r):this.#i;t(this.#n.target,a),t(this.#r.target,o),s.render(this.renderer,this.picture)}#f(e){return this.#o??=this.#p(),this.#o.slots.resize(this.#l,this.#u,e),this.#o.passes}#p(){let e=new X(this.#e.here,this.#a),t=this.#n.outputs(this.#a.share),[n]=Object.keys(t);return{slots:e,passes:{bins:U({...t,[n]:e.inserting(t[n])}),tail:this.#r.mrt(this.#n.weight,e.remaining),over:G(e.over(this.#r.picture))}}}#m({tail:e}){this.#s&&this.#s.bins.name!==e.name&&(this.#s.dispose(),this.#s=null),this.#c??=Te.of(gn(this.renderer));let[t,n]=[this.#c,this.#e.here];return this.#s??=new sn(this.renderer,t,e,n,this.#t,this.#r,this.#a,this.picture)}#h({technique:e,budget:t,bundle:n}){let r={technique:`binned`,budget:0,bundle:n},i=e===`kbuffer-deep`,a=i?Math.max(t,0):Math.min(Math.max(Math.floor(t),0),8);if(e===`binned`||!(a>0))return r;let o=this.#l*this.#u,s=i&&!n?`There is no bundle for kbuffer-deep.`:_n(this.renderer,i?sn.bytes(o,a,n.tail):X.bytes(this.#l,this.#u,a));return s&&s!==this.#d&&console.warn(`${s} Depth bins alone are used.`),this.#d=s,s?r:{technique:e,budget:a,bundle:n}}dispose(){let e=[this.#i,...this.#o?[this.#o.passes]:[]];V(this.renderer,new Set([this.#t.mrt,...e.flatMap(({bins:e,tail:t})=>[e,t])])),this.#t.dispose(),this.#n.target.dispose(),this.#r.target.dispose(),this.#i.over.dispose(),this.#o?.slots.dispose(),this.#o?.passes.over.dispose(),this.#s?.dispose()}};function hn(e){return e.hasFeature(`float32-blendable`)}function gn(e){return e.backend.device??null}function _n(e,t){let n=gn(e)?.limits;if(!n)return`A budget needs WebGPU, and this is WebGL 2.`;if(e.reversedDepthBuffer||e.logarithmicDepthBuffer)return`A budget needs the depth buffer as three.js has it unless told otherwise, not reversed or logarithmic.`;let r=Math.min(n.maxStorageBufferBindingSize,n.maxBufferSize);return t>r?`A budget of ${t} bytes in one buffer is above the ${r} of this device.`:``}var vn=class extends fe{budget;technique;bundle;#e;#t;#n=null;#r=!1;constructor(e,t,{budget:n=0,bundle:r=null,technique:i}={}){super(fe.COLOR,e,t,{samples:0}),this.budget=n,this.bundle=r,this.technique=i??(r?`kbuffer-deep`:`kbuffer`),this.#e=e,this.#t=t}static get type(){return`DiaphanePassNode`}setMRT(){throw Error(`This pass has one output, its picture. Add a pass of three.js for what else is wanted of the scene.`)}setSize(e,t){super.setSize(e,t),this.#n?.setSize(this.renderTarget.width,this.renderTarget.height)}updateBefore(e){let t=e.renderer;this.#n?.renderer!==t&&this.#i(t);let n=this.#n;n.begin(this.#t);let r=!0,i=t.getRenderObjectFunction();this.#o(t,(e,t)=>I(t)?(n.cover(e,this.#t),r=!1,!1):this.#s(t)),super.updateBefore(e),r||this.#a(t,n),t.setRenderObjectFunction(i)}async slots(){let e=this.#n?.deep;if(!e?.slots)return null;let t=await e.offsets();return{budget:e.slots,k:t.subarray(1).map((e,n)=>e-t[n])}}#i(e){this.#n?.dispose(),this.#n=new mn(e,this.renderTarget)}#a(e,t){let n=b.saveRendererState(e),r=b.resetSceneState(this.#e,{}),{mask:i}=this.#t.layers,a=this.getLayers();a&&(this.#t.layers.mask=a.mask),this.#o(e,(e,t)=>I(t)),Object.assign(e,{opaque:!1,transparent:!0,autoClear:!0,autoClearColor:!0}),e.autoClearDepth=e.autoClearStencil=!1;let{contextNode:o}=e;e.contextNode=Kt(e),t.render(this,(t,n)=>{e.setRenderTarget(t),e.setMRT(n),e.render(this.#e,this.#t),e.setMRT(null)}),e.contextNode=o,this.#t.layers.mask=i,b.restoreSceneState(this.#e,r),b.restoreRendererState(e,n)}#o(e,t){e.setRenderObjectFunction((n,r,i,a,o,...s)=>{if(!t(n,o))return;let{depthWrite:c}=o;I(o)&&(o.depthWrite=!1),e.renderObject(n,r,i,a,o,...s),o.depthWrite=c})}#s(e){return Wt(e)&&!this.#r&&(this.#r=!0,console.warn(`The material "${e.name}" transmits light. three.js draws it beneath what is transparent, since it reads what is behind it. Use opacity in the place of transmission to have it composited.`)),!0}dispose(){this.#n?.dispose(),this.#n=null,super.dispose()}};function yn(e,t,n){return new vn(e,t,n)}export{N as n,yn as t};
+}`,Y=e=>e.replace(/\b(words|luma|offsets|cuts|cursors|pool)\[/g,`diaphane_$1.value[`),X=class{renderer;gpu;bins;range;tail;visible;picture;#e=o(1,`uint`);#t=[];#n=new Map;#r=V([{name:`background`,type:le}]);#i;#a;#o;#s;#c=null;#l=0;constructor(e,t,r,i,a,o,s,c){this.renderer=e,this.gpu=t,this.bins=r,this.range=a,this.tail=o,this.visible=s,this.picture=c;let l=p(c.texture,S).level(E(0)).rgb;this.#i=new U(n(l.clamp(0,1).sqrt(),1)),this.#a=this.#p(i),this.#o=this.#m(i),this.#s=this.#h()}static bytes(e,t,{bins:n}){return 4*Math.max(n*e,3*Math.floor(t*e))}get bytes(){return this.#c?.bytes??0}get slots(){return this.#l}async offsets(){return this.#c?this.gpu.read(this.#c.offsets):new Uint32Array(1)}render(e,t,n){let r=this.#u();this.#l=r.slots(t),this.#d(r),r.begin(),n(this.tail.target,this.#a),this.#i.render(this.renderer,this.#r);let[i,a]=[this.range.tiles,this.#r].map(e=>this.#f(e));r.select(e,this.#l,i,a),n(this.tail.target,this.#o),r.sort(this.#l),this.#s.render(this.renderer,this.picture)}release(){for(let{attribute:e}of this.#n.values())e.dispose();this.#n.clear(),this.#c?.destroy(),this.#c=null,this.#r.dispose()}dispose(){this.release(),Xt(this.renderer,new Set([this.#a,this.#o])),this.#i.dispose(),this.#s.dispose()}#u(){let{width:e,height:t}=this.picture;return(this.#c?.width!==e||this.#c.height!==t)&&this.release(),this.#r.setSize(e,t),this.#e.value=e,this.#c??=new Wt(this.gpu,e,t,this.bins)}#d(e){for(let t of sn){let n=t===`pool`?e.pool(this.#l):e[t],r=this.#n.get(t);if(r?.buffer===n)continue;r?.attribute.dispose();let i=new x(new Uint32Array(1),1);fn(this.renderer,i).buffer=n,this.#n.set(t,{buffer:n,attribute:i});for(let e of this.#t)e.name===t&&(e.node.value=i)}}#f(e){return fn(this.renderer,e.texture).texture}#p(e){let t=this.#g([`bins`,`bin_words`,`add_to_bins`],{words:!0,luma:!0}),r=u(cn,[t]);return H({mean:_(()=>{let t=g(0).toVar(),i=this.#_.toVar(),a=d(z.clamp(0,1).sqrt().mul(255).add(.5)).toVar(),[o,s]=[e.toVar(),B.toVar()];return w(this.visible.is,()=>void t.assign(r(this.#v,o,i,s,a))),n(t)})(),depth:n(0)})}#m(e){let t=this.#g([`bins`,`bin_words`,`kept_bins`,`in_front`],{words:!1}),n=this.#g([],{offsets:!1,cuts:!1,cursors:!0,pool:!0}),[r,i]=[u(Y(ln),[t,n]),u(un,[t])],a=this.#_.toVar(),o=_(()=>{let t=this.visible.share.toVar(),n=z.max(0).min(65504).toVar(),i=e.toVar();return w(this.visible.is,()=>void t.assign(r(this.#v,i,a,n,R))),t})().toVar(),s=i(this.#v,e,a,B,R);return this.tail.mrt(s,o)}#h(){let e=this.#g([],{offsets:!1,cursors:!1,pool:!1}),t=u(Y(dn),[e])(this.#v).toVar(),r=this.tail.picture.toVar();return W(n(t.rgb.add(r.rgb.mul(t.a)),t.a.mul(r.a.oneMinus()).oneMinus()))}#g(e,t){let n=Object.entries(t).map(([e,t])=>{let n=f(new x(new Uint32Array(1),1),`uint`,1).setName(`diaphane_${e}`),r=t?n.toAtomic():n.toReadOnly();return this.#t.push({name:e,node:r}),r});return Se(e.length?Y(F(e,this.bins)):``,n)}get#_(){let{here:e}=this.range;return h(e.x,e.y.sub(e.x).max(0))}get#v(){return m(t.y).mul(this.#e).add(m(t.x))}};function fn(e,t){return e.backend.get(t)}var pn=Number(A.RANGE_TILE),Z=2,Q=`range`,mn=class{depth;target;tiles;#e;#t=o(new ae(1,1));#n=o(new ae(0,0));#r=new me;#i=new Ce;mrt;here;constructor(e,t){this.depth=e;let r=t?ye:he,i=t?1e-6:2**-10;this.target=V([{name:Q,format:b,type:r}]),this.tiles=V([{name:Q,format:b,type:r}]);let a=e.here,o=oe(a).abs().add(we(a).abs()).div(2).min(a.div(20)),[s,c]=[a.sub(o).max(1e-6),a.add(o)];this.mrt=H({[Q]:n(g(1).div(s).mul(1+i),c.mul(1+i),0,0)},!0),this.#e=new U(this.#a());let l=p(this.tiles.texture,S).level(E(0)).rg;this.here=h(g(1).div(l.x.max(1e-9)),l.y).toVar()}#a(){let e=(e,t)=>p(this.target.texture,S.add(h(e,t).div(this.#t).div(Z))).level(E(0)).rg,t=(t,n)=>{let r=h(0);for(let i=t;i<n;i++)for(let a=t;a<n;a++)r=r.max(e(a+.5,i+.5));return r.toVar()},[r,i]=[t(-1,1),t(-3,3)],a=i.y.greaterThan(0).select(i,this.#n);return n(r.y.greaterThan(0).select(r,a),0,0)}setSize(e,t){let[n,r]=[Math.ceil(e/pn),Math.ceil(t/pn)];this.target.setSize(Z*n,Z*r),this.tiles.setSize(n,r),this.#t.value.set(n,r)}begin(){this.#n.value.set(0,0)}cover(e,t){let{geometry:n}=e;n&&!n.boundingSphere&&n.computeBoundingSphere();let r=e.boundingSphere??n?.boundingSphere,[i,a]=[t.near,t.far];if(r&&e.frustumCulled){let{center:n,radius:o}=this.#r.copy(r).applyMatrix4(e.matrixWorld),s=-this.#i.copy(n).applyMatrix4(t.matrixWorldInverse).z;[i,a]=[Math.max(i,s-o),Math.min(a,s+o)]}let{value:o}=this.#n;o.set(Math.max(o.x,1/this.depth.of(i)),Math.max(o.y,this.depth.of(a)))}fill(e){this.#e.render(e,this.tiles)}dispose(){this.target.dispose(),this.tiles.dispose(),this.#e.dispose()}},hn=class{target=V([{name:`mean`},{name:`depth`,format:be}]);mrt(e,t){return H({mean:n(z,1).mul(e.mul(t)),depth:n(B.mul(t),0,0,0)})}get picture(){let[e,t]=this.target.textures.map(e=>p(e,S).level(E(0))),r=t.r.negate().exp().oneMinus();return n(e.rgb.div(e.a.max(1e-9)).mul(r),r)}},gn=2**-22,_n=class{is;share;constructor(e){let t=p(e.depthTexture,S).level(E(0)).r;this.is=_(e=>{if(!e.material.depthTest)return R.greaterThan(0);let{renderer:n,camera:r}=e,i=vn(n,r.isOrthographicCamera===!0)(fe.z,ie,ce),a=n.reversedDepthBuffer?i.greaterThanEqual(t.sub(gn)):i.lessThanEqual(t.add(gn));return R.greaterThan(0).and(a)})().toVar(),this.share=this.is.select(g(1),g(0)).toVar()}};function vn({reversedDepthBuffer:e,logarithmicDepthBuffer:t},n){return n?e?re:c:e?s:t?ne:te}var yn=class{renderer;picture;#e=new qt;#t;#n;#r=new hn;#i;#a;#o=null;#s=null;#c=null;#l=1;#u=1;#d=``;constructor(e,t){this.renderer=e,this.picture=t,this.#t=new mn(this.#e,bn(e)),this.#a=new _n(t),this.#n=new rn(this.#e.here,this.#t.here),this.#i={bins:H(this.#n.outputs(this.#a.share)),tail:this.#r.mrt(this.#n.weight,this.#a.share),over:W(this.#r.picture)},this.setSize(t.width,t.height)}setSize(e,t){this.#t.setSize(e,t),this.#n.target.setSize(e,t),this.#r.target.setSize(e,t),[this.#l,this.#u]=[e,t]}begin(e){this.#e.update(e),this.#t.begin()}cover(e,t){this.#t.cover(e,t)}get deep(){return this.#s}render(e,t){let{technique:n,budget:r,bundle:i}=this.#h(e);if(n!==`kbuffer`&&this.#o?.slots.release(),n!==`kbuffer-deep`&&this.#s?.release(),t(this.#t.target,this.#t.mrt),this.#t.fill(this.renderer),n===`kbuffer-deep`)return this.#m(i).render(i,r,t);let{bins:a,tail:o,over:s}=n===`kbuffer`?this.#f(r):this.#i;t(this.#n.target,a),t(this.#r.target,o),s.render(this.renderer,this.picture)}#f(e){return this.#o??=this.#p(),this.#o.slots.resize(this.#l,this.#u,e),this.#o.passes}#p(){let e=new on(this.#e.here,this.#a),t=this.#n.outputs(this.#a.share),[n]=Object.keys(t);return{slots:e,passes:{bins:H({...t,[n]:e.inserting(t[n])}),tail:this.#r.mrt(this.#n.weight,e.remaining),over:W(e.over(this.#r.picture))}}}#m({tail:e}){this.#s&&this.#s.bins.name!==e.name&&(this.#s.dispose(),this.#s=null),this.#c??=Oe.of($(this.renderer));let[t,n]=[this.#c,this.#e.here];return this.#s??=new X(this.renderer,t,e,n,this.#t,this.#r,this.#a,this.picture)}#h({technique:e,budget:t,bundle:n}){let r={technique:`binned`,budget:0,bundle:n},i=e===`kbuffer-deep`,a=i?Math.max(t,0):Math.min(Math.max(Math.floor(t),0),8);if(e===`binned`||!(a>0))return r;let o=this.#l*this.#u,s=i&&!n?`There is no bundle for kbuffer-deep.`:xn(this.renderer,i?X.bytes(o,a,n.tail):on.bytes(this.#l,this.#u,a));return s&&s!==this.#d&&console.warn(`${s} Depth bins alone are used.`),this.#d=s,s?r:{technique:e,budget:a,bundle:n}}dispose(){let e=[this.#i,...this.#o?[this.#o.passes]:[]];Xt(this.renderer,new Set([this.#t.mrt,...e.flatMap(({bins:e,tail:t})=>[e,t])])),this.#t.dispose(),this.#n.target.dispose(),this.#r.target.dispose(),this.#i.over.dispose(),this.#o?.slots.dispose(),this.#o?.passes.over.dispose(),this.#s?.dispose()}};function bn(e){return e.hasFeature(`float32-blendable`)}function $(e){return e.backend.device??null}function xn(e,t){let n=$(e)?.limits;if(!n)return`A budget needs WebGPU, and this is WebGL 2.`;let r=Math.min(n.maxStorageBufferBindingSize,n.maxBufferSize);return t>r?`A budget of ${t} bytes in one buffer is above the ${r} of this device.`:``}var Sn=class extends pe{budget;technique;bundle;#e;#t;#n=null;#r=!1;constructor(e,t,{budget:n=0,bundle:r=null,technique:i}={}){super(pe.COLOR,e,t,{samples:0}),this.budget=n,this.bundle=r,this.technique=i??(r?`kbuffer-deep`:`kbuffer`),this.#e=e,this.#t=t}static get type(){return`DiaphanePassNode`}setMRT(){throw Error(`This pass has one output, its picture. Add a pass of three.js for what else is wanted of the scene.`)}setSize(e,t){super.setSize(e,t),this.#n?.setSize(this.renderTarget.width,this.renderTarget.height)}updateBefore(e){let t=e.renderer;this.#n?.renderer!==t&&this.#i(t);let n=this.#n;n.begin(this.#t);let r=!0,i=t.getRenderObjectFunction();this.#o(t,(e,t)=>L(t)?(n.cover(e,this.#t),r=!1,!1):this.#s(t)),super.updateBefore(e),r||this.#a(t,n),t.setRenderObjectFunction(i)}async slots(){let e=this.#n?.deep;if(!e?.slots)return null;let t=await e.offsets();return{budget:e.slots,k:t.subarray(1).map((e,n)=>e-t[n])}}#i(e){this.#n?.dispose(),this.#n=new yn(e,this.renderTarget)}#a(e,t){let n=y.saveRendererState(e),r=y.resetSceneState(this.#e,{}),{mask:i}=this.#t.layers,a=this.getLayers();a&&(this.#t.layers.mask=a.mask),this.#o(e,(e,t)=>L(t)),Object.assign(e,{opaque:!1,transparent:!0,autoClear:!0,autoClearColor:!0}),e.autoClearDepth=e.autoClearStencil=!1;let{contextNode:o}=e;e.contextNode=Yt(e),t.render(this,(t,n)=>{e.setRenderTarget(t),e.setMRT(n),e.render(this.#e,this.#t),e.setMRT(null)}),e.contextNode=o,this.#t.layers.mask=i,y.restoreSceneState(this.#e,r),y.restoreRendererState(e,n)}#o(e,t){e.setRenderObjectFunction((n,r,i,a,o,...s)=>{if(!t(n,o))return;let{depthWrite:c}=o;L(o)&&(o.depthWrite=!1),e.renderObject(n,r,i,a,o,...s),o.depthWrite=c})}#s(e){return Kt(e)&&!this.#r&&(this.#r=!0,console.warn(`The material "${e.name}" transmits light. three.js draws it beneath what is transparent, since it reads what is behind it. Use opacity in the place of transmission to have it composited.`)),!0}dispose(){this.#n?.dispose(),this.#n=null,super.dispose()}};function Cn(e,t,n){return new Sn(e,t,n)}export{N as n,Cn as t};
