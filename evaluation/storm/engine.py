@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -142,39 +143,70 @@ def picture(
             frames=frames,
             out=str(Path(folder) / "picture.png"),
         )
-        told = _run(engine, job, _plugins(engine, Path(folder), resolve))
+        told = run_child(engine, _CHILD, asdict(job), _resolving(engine, Path(folder), resolve))
+        if not Path(job.out).is_file():
+            raise Problem(f"Storm made no picture of {stage}.", "Try the stage in usdview.")
         with Image.open(job.out) as image:
             pixels = np.asarray(image.convert("RGBA"))
     return Picture(pixels, told["seconds"][-1], told["cpu_seconds"][-1], told["version"])
 
 
-def _plugins(engine: Engine, folder: Path, resolve: Resolve | None) -> Path | None:
-    """A copy of the resources with another resolve, which is found before what is installed."""
-    if resolve is None:
-        return None
+def _resolving(engine: Engine, folder: Path, resolve: Resolve | None) -> Path | None:
+    """Resources with another resolve; None: as installed."""
+    return None if resolve is None else resources(engine, folder, {SHADER: lambda text: replaced(text, resolve)})
+
+
+def resources(engine: Engine, folder: Path, texts: Mapping[Path, Callable[[str], str]]) -> Path:
+    """A copy of Storm's resources with other texts, for one process.
+
+    Args:
+        engine: Where it is installed.
+        folder: Gets the copy.
+        texts: Of files, relative to the folder of plug-ins: what makes the new text of the old one.
+
+    Returns:
+        The copy, for `run_child`.
+    """
     copied = folder / "usd"
     shutil.copytree(engine.plugins, copied)
     for library in engine.plugins.parent.glob("libusd_ms.*"):
         (folder / library.name).symlink_to(library)
-    shader = copied / SHADER
-    shader.write_text(replaced(shader.read_text(encoding="utf-8"), resolve), encoding="utf-8")
+    for name, changed in texts.items():
+        file = copied / name
+        file.write_text(changed(file.read_text(encoding="utf-8")), encoding="utf-8")
     return copied
 
 
-def _run(engine: Engine, job: Job, plugins: Path | None) -> dict[str, Any]:
+def run_child(
+    engine: Engine,
+    script: Path,
+    job: Mapping[str, Any],
+    plugins: Path | None,
+) -> dict[str, Any]:
+    """Run a script in a process that has Storm.
+
+    Args:
+        engine: Where it is installed.
+        script: Reads the job from its standard input, and prints a line of JSON.
+        job: Has `stage` and `modules`, for the script.
+        plugins: Resources that are found before those that are installed (`resources`).
+
+    Raises:
+        Problem: It fails, or takes too long.
+    """
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "PXR_"))}
     if plugins is not None:
         environment["PXR_PLUGINPATH_NAME"] = str(plugins)
-    command = [str(engine.python), str(_CHILD)]
+    command = [str(engine.python), str(script)]
     try:
         done = subprocess.run(
-            command, input=json.dumps(asdict(job)), env=environment, capture_output=True, text=True, timeout=_SECONDS
+            command, input=json.dumps(job), env=environment, capture_output=True, text=True, timeout=_SECONDS
         )
     except subprocess.TimeoutExpired as error:
-        raise Problem(f"Storm took more than {_SECONDS} s for {job.stage}.", "Ask for a smaller picture.") from error
+        raise Problem(f"Storm took more than {_SECONDS} s for {job['stage']}.", "Ask for a smaller picture.") from error
     lines = done.stdout.strip().splitlines()
-    if done.returncode or not lines or not Path(job.out).is_file():
+    if done.returncode or not lines:
         reason = (done.stderr.strip().splitlines() or ["no message"])[-1]
-        raise Problem(f"Storm made no picture of {job.stage}: {reason}.", "Try the stage in usdview.")
+        raise Problem(f"Storm made no picture of {job['stage']}: {reason}.", "Try the stage in usdview.")
     told: dict[str, Any] = json.loads(lines[-1])
     return told
