@@ -44,8 +44,7 @@ class Shown {
   async render(width: number, height: number): Promise<number> {
     this.renderer.setSize(width, height);
     this.#target.setSize(width, height);
-    const frame = (): number => (this.renderer.info as unknown as { frame: number }).frame;
-    for (const last = frame(); frame() === last; ) await new Promise((done) => requestAnimationFrame(done));
+    for (let frame = 0; frame < 2; frame++) await new Promise((done) => requestAnimationFrame(done));
     const begun = performance.now();
     this.renderer.setRenderTarget(this.#target);
     this.#quad.render(this.renderer);
