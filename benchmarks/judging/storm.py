@@ -40,7 +40,7 @@ class Shot:
         orthographic: Whether rays are parallel.
         refine: Levels of subdivision.
         materials: Whether materials are shown, or only what shape things have.
-        cards: Whether models stand for themselves as their draw mode has it.
+        cards: Whether models are drawn by their draw mode, as cards or bounds. The loader reads none.
     """
 
     size: tuple[int, int]
@@ -51,7 +51,7 @@ class Shot:
     orthographic: bool
     refine: int
     materials: bool
-    cards: bool = True
+    cards: bool = False
 
 
 @dataclass(frozen=True, slots=True)

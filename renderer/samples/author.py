@@ -26,6 +26,7 @@ class StageAuthor:
 
     def __init__(self, file: Path, up: str = "Y", metres: float = 1.0) -> None:
         self.file = file
+        self._undrawn: list[Usd.Prim] = []
         self.stage = Usd.Stage.CreateInMemory()
         self.stage.SetMetadata("comment", "A sample scene of Diaphane.")
         self.stage.GetRootLayer().customLayerData = {LICENCE_KEYS[0]: "Apache-2.0"}
@@ -35,6 +36,8 @@ class StageAuthor:
 
     def save(self) -> Path:
         """Writes the file."""
+        for prim in self._undrawn:
+            prim.SetSpecifier(Sdf.SpecifierOver)
         self.stage.GetRootLayer().Export(str(self.file))
         return self.file
 
@@ -278,8 +281,11 @@ class StageAuthor:
         instancer.CreateScalesAttr(Vt.Vec3fArray.FromNumpy(np.repeat(scales[:, None], 3, axis=1).astype(np.float32)))
 
     def prototypes(self, path: str) -> None:
-        """Makes /World/<path> a scope that is never drawn where it stands."""
-        self.stage.CreateClassPrim(f"/World/{path}")
+        """Makes /World/<path> a scope that is never drawn where it stands: an `over` when the stage is saved.
+
+        Of a class, Storm draws nothing where a point instancer has its prototypes.
+        """
+        self._undrawn.append(self.stage.CreateClassPrim(f"/World/{path}"))
 
     def camera(
         self, name: str, eye: tuple[float, float, float], target: tuple[float, float, float], fov: float = 40.0

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pxr import Usd, UsdGeom
 
 from renderer.samples import SAMPLES, write_samples
 from renderer.scene import load_scene
@@ -58,3 +59,17 @@ def test_the_samples_cover_axes_units_textures_and_cut_outs(scenes: dict[str, Sc
     assert any(s.up == (0.0, 0.0, 1.0) and s.metres_per_unit == 0.01 for s in scenes.values())
     assert any(b.opacity_threshold > 0 for s in scenes.values() for b in s.batches)
     assert any(b.layer == "mixed" and b.opacity_threshold == 0 for s in scenes.values() for b in s.batches)
+
+
+def test_no_point_instancer_draws_a_class_of_which_storm_shows_nothing(folder: Path) -> None:
+    stages = [Usd.Stage.Open(str(file)) for file in sorted(folder.glob("*.usd?"))]
+    instancers = [UsdGeom.PointInstancer(prim) for stage in stages for prim in stage.Traverse()]
+    kinds = [
+        instancer.GetPrim().GetStage().GetPrimAtPath(path)
+        for instancer in instancers
+        if instancer
+        for path in instancer.GetPrototypesRel().GetTargets()
+    ]
+    assert kinds
+    # Nor are they drawn where they stand.
+    assert all(not kind.IsAbstract() and not kind.IsDefined() for kind in kinds)
