@@ -68,7 +68,7 @@ class Picture:
         k: Least and greatest k of a pixel that has fragments.
         passes: Milliseconds of each pass.
         pool_bytes: Storage that grows with fragments or slots.
-        pixel_bytes: All other buffers beside it, bytes a pixel.
+        pixel_bytes: All other buffers beside it, bytes per pixel.
         total_bytes: Peak of the frame. Of an exact technique also where there is no picture: what it would need.
         fits: Whether the pool fits one storage buffer; a larger one is rendered in bands of rows, or not at all.
         skips: What was not needed -> how often.

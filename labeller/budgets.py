@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from typing import Final
 
 RUNGS: Final = (0.05, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
-"""Default budgets are some of these multiples of W H: 4 is 32 bytes a pixel of slots, and a view with fewer fragments
+"""Default budgets are some of these multiples of W H: 4 is 32 bytes per pixel of slots, and a view with fewer fragments
 than 0.05 W H has less to save than a technique's other buffers take. Few and fixed, so that views of like depth get
 the same ones, and their labels and pictures are found again."""
 MOST_HELD: Final = 0.75

@@ -1,6 +1,6 @@
 """Between which depths the depth bins of a pixel lie: the range of its tile (METHOD section 2).
 
-A range of each pixel's own would be nearer, at 12 bytes a pixel and a geometry pass of its own; that of a tile of
+A range of each pixel's own would be nearer, at 12 bytes per pixel and a geometry pass of its own; that of a tile of
 `RANGE_TILE` squared pixels is 64 times smaller, and can be estimated at a quarter of the resolution
 (`shaders/range/range.frag`). What lies outside of an estimate counts as at its end: a wrong range costs quality and
 never correctness.

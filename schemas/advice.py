@@ -60,7 +60,7 @@ class SeenView(_Plain):
 
     Attributes:
         name: Of the view.
-        load: N / P, transparent fragments a pixel.
+        load: N / P, transparent fragments per pixel.
         most: Fragments of the fullest pixel; None: not known.
     """
 
@@ -79,7 +79,7 @@ class Sample(_Plain):
         budget: F / P; None: it reads none.
         tail: Of a bounded technique; '' of others.
         bundle: Label of the bundle that it runs; '' of others.
-        pixel_bytes: All buffers of the frame at their peak, bytes a pixel of the picture.
+        pixel_bytes: All buffers of the frame at their peak, bytes per pixel of the picture.
         mse: Against the exact picture, 8-bit sRGB, values in [0, 1]; 0 of an exact technique.
     """
 

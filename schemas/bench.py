@@ -83,8 +83,8 @@ class BenchCell(CellKey):
         k_max: Most.
         captured_fragments: Sum of k.
         pool_bytes: Size of the fragment pool.
-        pixel_bytes: All other buffers beside it, bytes a pixel.
-        early_bytes: Most before there is a pool, bytes a pixel.
+        pixel_bytes: All other buffers beside it, bytes per pixel.
+        early_bytes: Most before there is a pool, bytes per pixel.
         total_bytes: The peak of the frame: pool and what lives beside it, or what was there before;
             of multilayer and adaptive their nodes, of an engine's lists what the engine takes; the pool emulates them.
         fits: Whether the pool is no larger than one storage buffer (`schemas.limits.LIMITS.buffer_bytes`). A larger one

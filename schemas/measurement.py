@@ -42,7 +42,7 @@ class Measurement(_Record):
         captured_fragments: Sum of k over the pixels, at most `budget`.
         total_fragments: N, transparent fragments of the view.
         pool_bytes: Size of the fragment pool.
-        pixel_bytes: All other buffers of the technique that live beside it, bytes a pixel.
+        pixel_bytes: All other buffers of the technique that live beside it, bytes per pixel.
         total_bytes: Peak of a frame: all buffers of the technique that depend on budget or resolution.
         passes: Wall time of each pass, ms.
         total_ms: Wall time of a frame, ms.

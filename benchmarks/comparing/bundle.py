@@ -56,7 +56,7 @@ MULTIPLES: Final = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0)
 """Budgets that prices are drawn near, as multiples of width x height, where they hold no more than HELD of N."""
 HELD: Final = 0.95
 LEAST_FRAGMENTS: Final = 0.15
-"""Views with fewer fragments a pixel teach little."""
+"""Views with fewer fragments per pixel teach little."""
 STEPS: Final = 4000
 """Of the training: more than a build takes for its few scenes, 4 % of the error less (benchmarks/TRIALS.md)."""
 _PARITY_ROWS: Final = 100_000

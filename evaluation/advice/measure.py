@@ -30,7 +30,7 @@ from schemas.work import total_work
 MEASURED_PIXELS: Final = 384 * 216
 """Errors are means over pixels: so many are enough to rank techniques, and a scene is advised in seconds."""
 COUNTED_PIXELS: Final = 1920 * 1080
-"""Counting is one pass over the geometry; fragments a pixel do not depend on the size beyond this."""
+"""Counting is one pass over the geometry; fragments per pixel do not depend on the size beyond this."""
 LEFT_OUT: Final = ("kbuffer-temporal", "kbuffer-optimal")
 """The first is `kbuffer-deep` on a still view; no renderer can have the second."""
 

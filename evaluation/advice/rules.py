@@ -1,6 +1,6 @@
 """What follows from bytes and errors: pure functions that hold for any scene.
 
-- All buffers grow with the pixels, so bytes at a size are bytes a pixel times its pixels.
+- All buffers grow with the pixels, so bytes at a size are bytes per pixel times its pixels.
 - The S-buffer is exact. Where it fits the memory, nothing else is needed.
 - Otherwise the technique of least error that fits; of those as good as equal, the one that takes the fewest bytes.
 - Peeling is exact in constant memory, but draws the geometry once a layer: it is told, and never the first choice.

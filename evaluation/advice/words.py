@@ -59,19 +59,19 @@ def _verdict(advice: Advice) -> str:
     needs = f"the S-buffer, which is exact, takes {_mib(exact, choice)} MiB" if exact is not None else ""
     if choice.verdict == "exact" and choice.chosen is not None:
         return (
-            f"{_loads(advice)} fragments a pixel: use the S-buffer (sbuffer). It is exact and takes "
+            f"{_loads(advice)} fragments per pixel: use the S-buffer (sbuffer). It is exact and takes "
             f"{_mib(choice.chosen, choice)} MiB of {memory} at {choice.size}. A budget pays above "
-            f"{number(choice.pays_above)} fragments a pixel, where the S-buffer does not fit any more."
+            f"{number(choice.pays_above)} fragments per pixel, where the S-buffer does not fit any more."
         )
     if choice.chosen is None:
         least = _least(advice)
         what = "" if least.technique == EXACT else f", and what takes least, {said(least)}, {_mib(least, choice)} MiB"
         return (
-            f"{_loads(advice)} fragments a pixel, and nothing that was measured fits {memory} at {choice.size}: "
+            f"{_loads(advice)} fragments per pixel, and nothing that was measured fits {memory} at {choice.size}: "
             f"{needs}{what}. Allow more memory or render fewer pixels."
         )
     return (
-        f"{_loads(advice)} fragments a pixel: {needs}, and {memory} at {choice.size} hold "
+        f"{_loads(advice)} fragments per pixel: {needs}, and {memory} at {choice.size} hold "
         f"{number(choice.pays_above)} a pixel. Use {said(choice.chosen)}: {_mib(choice.chosen, choice)} MiB, "
         f"{said_error(choice.chosen.mse)}, the least error that fits.{_ties(choice)}"
     )

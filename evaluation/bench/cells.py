@@ -84,7 +84,7 @@ def fragments_within(total_bytes: int, pixels: int, pixel_bytes: int, early_byte
     Args:
         total_bytes: M.
         pixels: |P|.
-        pixel_bytes: S_p, bytes a pixel of everything beside the pool.
+        pixel_bytes: S_p, bytes per pixel of everything beside the pool.
         early_bytes: Bytes a pixel before there is a pool; they have to fit as well, and may lie where it will be.
 
     Returns:

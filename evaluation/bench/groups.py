@@ -104,7 +104,7 @@ class Group:
 
     @property
     def depth(self) -> float:
-        """N / WH: transparent fragments a pixel, mean over the views."""
+        """N / WH: transparent fragments per pixel, mean over the views."""
         return mean([depth_of(view) for view in self.views]) or 0.0
 
 
@@ -192,7 +192,7 @@ def said_alpha(alpha: float | None) -> str:
 
 
 def depth_of(view: BenchView) -> float:
-    """N / WH: transparent fragments a pixel."""
+    """N / WH: transparent fragments per pixel."""
     return view.fragments / (view.width * view.height)
 
 

@@ -87,7 +87,7 @@ def _compared(engine: Engine, file: Path, size: tuple[int, int], alpha: float | 
         view = framing_view(scene)
         exact = picture(engine, usd, scene, view, size, alpha, "exact", frames=1)
         if (exact.pixels == _FULL).all(axis=2).any():
-            raise Problem("Storm's pool of 8 fragments a pixel is full.", "Ask for a view with fewer layers.")
+            raise Problem("Storm's pool of 8 fragments per pixel is full.", "Ask for a view with fewer layers.")
         shipped = picture(engine, usd, scene, view, size, alpha)
         nearest = picture(engine, usd, scene, view, size, alpha, "nearest")
     if sheets is not None:

@@ -140,7 +140,7 @@ BOUNDS: Final[dict[str, Bound]] = {
         "no room for: every operation is rounded by itself, so that nothing may.",
     ),
 }
-"""Fast path, without its driver -> bound, for up to 100 fragments a pixel."""
+"""Fast path, without its driver -> bound, for up to 100 fragments per pixel."""
 
 DEEP: Final[dict[str, Bound]] = {
     "moment": _picture(5e-5, "As above, and sums of 4096 terms."),
@@ -160,7 +160,7 @@ DEEP: Final[dict[str, Bound]] = {
     "weighted-blended": _picture(1e-5, "The same; weights differ, so that roundings cancel."),
     "stochastic": _picture(1e-5, "Sums of 4096 terms."),
 }
-"""The same for 4096 fragments a pixel, where that differs."""
+"""The same for 4096 fragments per pixel, where that differs."""
 
 
 PATHS: Final = (

@@ -18,7 +18,7 @@ from schemas.tail import TAIL_NAMES, TailName
 from schemas.view import Vec3, View
 
 FACTORS = (0.125, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
-"""Budgets that the keys go through, fragments a pixel."""
+"""Budgets that the keys go through, fragments per pixel."""
 _GAINS = (1.0, 1024.0)
 """Least and greatest amplification of a difference."""
 _TURN = np.radians(5.0)

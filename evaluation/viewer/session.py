@@ -164,7 +164,7 @@ class Session:
         """Of a window."""
         look = self.look
         names = " | ".join((look.left, look.right) if is_paired(look.layout) else (look.left,))
-        return f"{self.name} - {names} - {look.factor:g} fragments a pixel - Diaphane"
+        return f"{self.name} - {names} - {look.factor:g} fragments per pixel - Diaphane"
 
     def show(self, view: View) -> None:
         """Look from somewhere else."""

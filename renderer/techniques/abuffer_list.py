@@ -1,4 +1,4 @@
-"""`abuffer-list`: exact. A linked list of fragments a pixel (Yang et al. 2010, "Real-Time Concurrent Linked Lists").
+"""`abuffer-list`: exact. A linked list of fragments per pixel (Yang et al. 2010, "Real-Time Concurrent Linked Lists").
 
 One pass pushes every fragment on its pixel's list: an atomic counter gives it a node, an atomic exchange of the
 pixel's head links it. Then the lists are sorted and composited.

@@ -11,7 +11,7 @@ NODES = 8
 
 POOL = EnginePool(slots=4, pixel_bytes=4 * 12 + 4)
 """The default `fragments_per_pixel_average`; a node is a colour, a depth with opacity and an index, a head one word: 52
-bytes a pixel."""
+bytes per pixel."""
 
 
 class Bevy(Technique):

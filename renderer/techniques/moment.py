@@ -47,8 +47,8 @@ class Moment(Technique):
     What differs from the paper: depths are warped logarithmically, as there, but between the nearest and the farthest
     fragment of the pixel instead of the camera's planes. Moments of an affine image of x tell the same, so without bias
     and rounding nothing would change; with them, a pixel whose fragments are close together for the scene keeps its
-    digits. It costs the count pass and 12 bytes a pixel, and has about .7 times the squared error. Where b_0 is large,
-    T is taken relative to the nearest depth: the factor cancels, and weights do not vanish.
+    digits. It costs the count pass and 12 bytes per pixel, and has about .7 times the squared error. Where b_0 is
+    large, T is taken relative to the nearest depth: the factor cancels, and weights do not vanish.
 
     Args:
         bias: Of the moments, above 0.

@@ -22,7 +22,7 @@ class Multilayer(Technique):
     synchronisation, now fragment-shader interlock), which few devices have and no software driver. Here the fragments
     are captured with their order of submission and composited in that order with the layers in registers. The picture
     is the same and does not vary between runs; the memory is not: `Rendered` reports the captured fragments, 12 bytes
-    each, and beside them as `node_bytes` what a device with interlock needs, 8 bytes a layer (32 bytes a pixel for
+    each, and beside them as `node_bytes` what a device with interlock needs, 8 bytes a layer (32 bytes per pixel for
     MLAB4: RGBA8 and a float depth).
     Layers hold float32 colours, not RGBA8: nothing is rounded when layers merge.
 

@@ -99,7 +99,7 @@ def check_nodes(technique: str, nodes: int, least: int) -> int:
     """
     if not least <= nodes <= MAX_NODES:
         raise Problem(
-            f"{technique} cannot work with {nodes} nodes a pixel.", f"Ask for {least} up to {MAX_NODES} nodes."
+            f"{technique} cannot work with {nodes} nodes per pixel.", f"Ask for {least} up to {MAX_NODES} nodes."
         )
     return nodes
 

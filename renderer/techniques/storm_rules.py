@@ -7,10 +7,10 @@ from renderer.techniques.base import Budget, Rendered, Technique, Twin
 from renderer.techniques.ordered import EnginePool, render_ordered
 
 NODES = 8
-"""`maxSamples` of `oitResolveImageShader.glslfx`, which is also the pool's nodes a pixel."""
+"""`maxSamples` of `oitResolveImageShader.glslfx`, which is also the pool's nodes per pixel."""
 
 POOL = EnginePool(slots=8, pixel_bytes=8 * (16 + 4 + 4) + 4)
-"""A node is RGBA32F, a float depth and an index; a pixel's head is one word: 196 bytes a pixel."""
+"""A node is RGBA32F, a float depth and an index; a pixel's head is one word: 196 bytes per pixel."""
 
 
 class StormRules(Technique):

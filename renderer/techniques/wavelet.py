@@ -28,7 +28,7 @@ class Wavelet(Technique):
     knows every step.
 
     What differs from them: coefficients and sums are float32 instead of half floats, so that errors are those of the
-    basis; 64 bytes a pixel of coefficients, which half floats halve. T is kept in a sum of its own and not read from
+    basis; 64 bytes per pixel of coefficients, which half floats halve. T is kept in a sum of its own and not read from
     the coefficients.
     """
 

@@ -223,7 +223,7 @@ def test_passes_bytes_and_skips_are_reported__technique(frame: Frame, dump: Frag
 
 @pytest.mark.parametrize(("made", "nodes"), [(Multilayer, 0), (Multilayer, 17), (Adaptive, 1), (Adaptive, 17)])
 def test_nodes_out_of_range_are_a_problem(made: type[Multilayer | Adaptive], nodes: int) -> None:
-    with pytest.raises(Problem, match=f"{nodes} nodes a pixel"):
+    with pytest.raises(Problem, match=f"{nodes} nodes per pixel"):
         made(nodes)
 
 

@@ -1,4 +1,4 @@
-"""Sample scenes that budgets are for: 8 to 100 transparent fragments a pixel, their opacities as authored."""
+"""Sample scenes that budgets are for: 8 to 100 transparent fragments per pixel, their opacities as authored."""
 
 from __future__ import annotations
 

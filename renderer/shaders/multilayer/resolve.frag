@@ -1,5 +1,5 @@
 #version 450
-// Multi-layer alpha blending (Salvi and Vaidyanathan 2014, section 3): NODES nodes a pixel, in registers.
+// Multi-layer alpha blending (Salvi and Vaidyanathan 2014, section 3): NODES nodes per pixel, in registers.
 #include "ordered/runs.glsl"
 layout(location = 0) out vec4 out_colour;
 

@@ -32,7 +32,7 @@ DEPTHS = {
     "smoke_plume": 51.5,
     "cloudscape": 91.9,
 }
-"""Transparent fragments a pixel of the first camera at 1430x960."""
+"""Transparent fragments per pixel of the first camera at 1430x960."""
 SIZE = (143, 96)
 DOCUMENT = Path(__file__).resolve().parents[3] / "docs" / "SAMPLES.md"
 

@@ -187,7 +187,7 @@ def test_budgets_that_were_not_given_follow_from_the_held_out_views_and_are_in_t
     run(runner, spec(budgets=None))
     assert said == [
         "Budgets 0.05, 0.125, 0.25, 0.5, 1 (x width x height), because the 2 views to measure hold 0.39 to 2.3 "
-        "transparent fragments a pixel: a budget decides something where it holds up to 75% of a view's fragments. "
+        "transparent fragments per pixel: a budget decides something where it holds up to 75% of a view's fragments. "
         "--budgets gives others."
     ]
     factors = [0.05, 0.125, 0.25, 0.5, 1.0]

@@ -20,7 +20,7 @@ def test_a_benchmark_is_advised_on_by_its_cells() -> None:
     assert advice.choice.chosen.technique == "sbuffer"
     assert advice.choice.chosen.bytes_at(SMALL.pixels) == 8 * 400 + 4 * 100
     assert {one.technique for one in advice.best} == {"kbuffer", "weighted-blended", "sbuffer"}
-    assert advice.text[0].startswith("4.00 fragments a pixel: use the S-buffer")
+    assert advice.text[0].startswith("4.00 fragments per pixel: use the S-buffer")
 
 
 def test_cells_without_a_picture_are_left_out() -> None:

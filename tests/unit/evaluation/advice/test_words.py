@@ -19,8 +19,8 @@ ASKED = Asked("a b.usd", ("--alpha", "0.3"), None, "benchmarks/bundle")
 def test_exact_is_said_with_its_bytes_and_where_a_budget_pays() -> None:
     first = sentences(advise(scene(2.0, DEEP), FRAME, 64 * MIB))[0]
     assert first == (
-        "2.00 fragments a pixel: use the S-buffer (sbuffer). It is exact and takes 19.1 MiB of 64.0 MiB at 1000x1000. "
-        "A budget pays above 7.89 fragments a pixel, where the S-buffer does not fit any more."
+        "2.00 fragments per pixel: use the S-buffer (sbuffer). It is exact and takes 19.1 MiB of 64.0 MiB at "
+        "1000x1000. A budget pays above 7.89 fragments per pixel, where the S-buffer does not fit any more."
     )
 
 

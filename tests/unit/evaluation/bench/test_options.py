@@ -36,7 +36,7 @@ def options(tmp_path: Path) -> BenchOptions:
         ({"bundle": ""}, "--bundle is empty."),
         (
             {"techniques": ("multilayer", "adaptive"), "needs": Needs(nodes=1)},
-            "adaptive cannot work with 1 nodes a pixel.",
+            "adaptive cannot work with 1 nodes per pixel.",
         ),
         (
             {"techniques": ("stochastic",), "needs": Needs(samples=0)},
