@@ -44,7 +44,7 @@ integration() { # of tests/integration, without test_ and .py
     printf 'tests/integration/test_%s.py\n' "$@"
 }
 
-browsers=(compare_browser dashboard_browser view_window web_build web_client web_three)
+browsers=(compare_browser dashboard_browser view_window web_build web_client web_three web_examples)
 computing=(build cli_bench gpu_benchmark labeller_benchmark predictors_benchmark retrain stress_gl zink)
 deployed=(deploy_compose deploy_images deploy_k8s deploy_run)
 
