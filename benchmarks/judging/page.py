@@ -8,7 +8,7 @@ from typing import Any
 
 from benchmarks.judging.agreement import ALPHA, COLOUR, DEPTH, Count
 from benchmarks.judging.judge import CAMERAS, HEIGHT, KINDS, Verdict
-from benchmarks.judging.reasons import REASONS
+from benchmarks.judging.reasons import PICTURES, REASONS
 from benchmarks.markdown import table
 from benchmarks.provenance import said
 
@@ -43,7 +43,9 @@ def figures(verdicts: Sequence[Verdict]) -> dict[str, Any]:
         scene["stages"] += 1
         scene["full"] += verdict.full
         if verdict.refused:
-            scene["refused"].append(f"{verdict.case.path.name}: {verdict.refused.split('/')[-1]}")
+            scene["refused"].append(
+                f"{verdict.case.path.name}: {verdict.refused.replace(f'{verdict.case.path.parent}/', '')}"
+            )
         wrong = {kind: count.unexplained for kind, count in verdict.counts.items() if count.unexplained}
         if wrong:
             scene["differs"][verdict.case.path.name] = wrong
@@ -84,6 +86,15 @@ def page(found: dict[str, Any]) -> str:
             "",
             *_left_out(scenes),
             "",
+            "## Pictures of differences",
+            "",
+            "Above: as loaded here, in Storm, what is not explained. Below: both depths, difference of opacity.",
+            "",
+            *(
+                line
+                for name, text in PICTURES.items()
+                for line in (f"{text}:", "", f"![{text}](results/loader/{name}.png)", "")
+            ),
         ]
     )
 

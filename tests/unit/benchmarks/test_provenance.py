@@ -13,6 +13,7 @@ from benchmarks import forgetting, provenance, suite, temporal
 from benchmarks.casting import page as raycast
 from benchmarks.casting.check import Effort
 from benchmarks.chaos import page as chaos
+from benchmarks.judging import page as judging
 from benchmarks.labelling import page as labelling
 from benchmarks.load import page as load
 from benchmarks.outputs import write_figures
@@ -24,6 +25,7 @@ PAGES: dict[str, tuple[str, Callable[[Any], str]]] = {
     "CHAOS": ("chaos", chaos.page),
     "FORGETTING": ("forgetting", forgetting.page),
     "LABELLER": ("labeller", labelling.page),
+    "LOADER": ("loader", judging.page),
     "LOAD": ("service-load", load.page),
     "RAYCAST": ("raycast", lambda found: raycast.page(found, Effort())),
     "RENDERER": ("renderer", render.page),
