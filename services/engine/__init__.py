@@ -2,7 +2,8 @@
 
 Modules, from the bottom up:
 
-    system      the one place that knows DBOS's tables and inner names
+    system      DBOS: its public calls and its documented table of workflows
+    steering    the one function that changes DBOS from within: slots of a process, cheap looks, short waits
     queues      a queue for each role and one for checks, fair shares between jobs
     events      what happened in a job, numbered
     states      transitions of jobs, each one transaction

@@ -143,7 +143,8 @@ class Liveness:
         dead = self._dead(patient=patient)
         if dead:
             log.warning("taking over from dead executors", executors=dead)
-            system.recover(dead)
+            with self._database.write() as connection:
+                system.recover(connection, self._database, dead)
         return dead
 
     def _dead(self, *, patient: bool) -> list[str]:

@@ -56,7 +56,7 @@ def slots(settings: Settings, roles: tuple[Role, ...]) -> dict[str, int]:
 def register(client: DBOSClient, settings: Settings) -> None:
     """Makes the queues known to all processes.
 
-    A process claims nothing before it has said how much it can do (`system.steer_claims`).
+    A process claims nothing before it has said how much it can do (`steering.steer`).
     """
     for queue in QUEUES:
         client.register_queue(queue, worker_concurrency=0, polling_interval_sec=settings.poll)

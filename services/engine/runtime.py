@@ -17,7 +17,7 @@ from schemas.job import JobSpec
 from schemas.problem import ExitCode, Problem
 from services.clock import iso
 from services.database import Database, open_database
-from services.engine import checks, flow, queues, states, system
+from services.engine import checks, flow, queues, states, steering, system
 from services.engine.child import resolve
 from services.engine.children import ChildOptions, Hooks
 from services.engine.claims import Claims
@@ -269,8 +269,7 @@ class Runtime:
         DBOS(config=config)
         DBOS.listen_queues(list(self._slots))
         DBOS.launch()
-        system.steer_claims(self._database, self._claimable)
-        system.bound_waits()
+        steering.steer(self._database, self._claimable)
 
     def _child_options(self, children: int) -> ChildOptions:
         self._scratch = Scratch(self.settings.state.resolve() / "work")

@@ -1,4 +1,4 @@
-"""The one place that knows DBOS's tables and inner names; `tests/integration/test_engine_contract.py` guards them.
+"""DBOS by its public calls and its documented table of workflows: `tests/integration/test_engine_contract.py`.
 
 DBOS gives durable queues: a workflow is a row that one executor at a time claims. Everything that a user sees lies in
 tables of our own, in the same database, so that a state and what is queued for it change in one transaction.
@@ -6,8 +6,6 @@ tables of our own, in the same database, so that a state and what is queued for 
 
 from __future__ import annotations
 
-import threading
-import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final
@@ -26,10 +24,6 @@ VERSION: Final = "1"
 LIVE: Final = ("ENQUEUED", "DELAYED", "PENDING")
 LOST: Final = "MAX_RECOVERY_ATTEMPTS_EXCEEDED"
 SCHEMA: Final = "dbos"
-LONGEST_WAIT_SECONDS = 2.0
-"""Before DBOS asks again for a database that did not answer."""
-QUEUE_SECONDS = 5.0
-"""For so long a process goes by what it has read of a queue: nothing there changes while a service runs."""
 
 _COLUMNS = (
     *("workflow_uuid", "status", "name", "executor_id", "application_version", "queue_name", "priority"),
@@ -188,9 +182,30 @@ def hand_back(connection: sa.Connection, database: Database, executor: str, ids:
     if ids is not None:
         mine.append(table.c.workflow_uuid.in_(list(ids)))
     attempts = sa.case((table.c.recovery_attempts > 0, table.c.recovery_attempts - 1), else_=0)
+    return _queue_again(connection, database, mine, recovery_attempts=attempts)
+
+
+def recover(connection: sa.Connection, database: Database, executors: Sequence[str]) -> int:
+    """Queues again what dead executors have claimed; each claim counts as a lost attempt. How many.
+
+    DBOS's public `resume_workflows` asks neither who has a workflow nor whether it was cancelled, and counts attempts
+    anew: called a moment late it takes a task from the living or runs what was cancelled, and no task would ever be
+    given up. So the condition and the change are one statement here. Rows that somebody else changes at this moment
+    are left for the next look: no two processes wait for each other's rows.
+    """
+    table = workflows(database)
+    theirs = [table.c.status == "PENDING", table.c.executor_id.in_(list(executors))]
+    theirs.append(table.c.application_version == VERSION)
+    found = list(connection.scalars(sa.select(table.c.workflow_uuid).where(*theirs).with_for_update(skip_locked=True)))
+    return _queue_again(connection, database, [*theirs, table.c.workflow_uuid.in_(found)]) if found else 0
+
+
+def _queue_again(
+    connection: sa.Connection, database: Database, which: Sequence[sa.ColumnElement[bool]], **more: Any
+) -> int:
     values: dict[str, Any] = {"status": "ENQUEUED", "owner_xid": None, "started_at_epoch_ms": None}
-    values |= {"recovery_attempts": attempts, "updated_at": _milliseconds(database)}
-    return connection.execute(table.update().where(*mine).values(**values)).rowcount
+    values |= {"updated_at": _milliseconds(database), **more}
+    return connection.execute(workflows(database).update().where(*which).values(**values)).rowcount
 
 
 def owned(connection: sa.Connection, database: Database, executor: str) -> set[str]:
@@ -205,13 +220,6 @@ def owners(connection: sa.Connection, database: Database) -> set[str]:
     table = workflows(database)
     found = sa.select(table.c.executor_id).where(table.c.status == "PENDING", table.c.application_version == VERSION)
     return {executor for executor in connection.scalars(found.distinct()) if executor is not None}
-
-
-def recover(executors: Sequence[str]) -> None:
-    """Queues again what dead executors had claimed. The name is DBOS's own; it counts as a lost attempt."""
-    from dbos import DBOS
-
-    DBOS._recover_pending_workflows(list(executors))
 
 
 def once(name: str, body: Callable[[], Any]) -> Any:
@@ -239,72 +247,6 @@ def remove(client: DBOSClient, ids: Sequence[str]) -> None:
         client.delete_workflows(list(ids[start : start + 500]))
 
 
-def steer_claims(database: Database, slots: dict[str, int]) -> None:
-    """Bounds what this process claims of each queue, and has it ask for work in a tenth of a millisecond.
-
-    DBOS keeps a queue's concurrency in the database, the same for all workers, but machines differ: the process's own
-    number is put into what it reads there. And DBOS looks into a queue with two transactions, whether anything waits
-    or not: 3 ms of the processor at every poll of every process. So one short statement is asked first, as often as
-    before, and DBOS claims where it finds something.
-
-    Args:
-        database: That the queues are in.
-        slots: How much this process does of each queue at once; the dictionary may change at any time.
-    """
-    from dbos._dbos import _get_dbos_instance
-
-    system_database = _get_dbos_instance()._sys_db
-    read, read_at, queues = system_database.get_queue, dict[str, float](), dict[str, Any]()
-    waits = _Waits(database)
-
-    def get_queue(name: str, **options: Any) -> Any:
-        now = time.monotonic()
-        if name not in queues or now - read_at[name] > QUEUE_SECONDS:
-            queues[name], read_at[name] = read(name, **options), now
-        queue = queues[name]
-        if queue is not None:
-            queue._worker_concurrency = slots.get(name, 0)
-        return queue
-
-    def dequeue_scopes(name: str) -> list[None]:
-        return [None] if waits(name) else []
-
-    vars(system_database).update(get_queue=get_queue, dequeue_scopes=dequeue_scopes)
-
-
-class _Waits:
-    """Asks whether anything waits in a queue: by the driver, on a connection that each thread keeps."""
-
-    def __init__(self, database: Database) -> None:
-        self._database, self._own = database, threading.local()
-        self._texts: dict[str, str] = {}
-
-    def __call__(self, queue: str) -> bool:
-        if not hasattr(self._own, "connection"):
-            self._own.connection = self._connect()
-        try:
-            return bool(self._own.connection.execute(self._text(queue)).fetchall())
-        except Exception:  # the server went away: the next look connects again
-            self._own.connection.close()
-            del self._own.connection
-            raise
-
-    def _connect(self) -> Any:
-        pooled = self._database.engine.raw_connection()
-        connection: Any = pooled.driver_connection
-        pooled.detach()
-        if self._database.is_postgresql:  # to SQLite's it is by our own setting
-            connection.autocommit = True
-        return connection
-
-    def _text(self, queue: str) -> str:
-        if queue not in self._texts:
-            asked = waiting(self._database).params(queue=queue)
-            options = {"literal_binds": True}
-            self._texts[queue] = str(asked.compile(self._database.engine, compile_kwargs=options))
-        return self._texts[queue]
-
-
 def waiting(database: Database) -> sa.Select[Any]:
     """Whether anything waits in the queue `queue`: one row or none."""
     table = workflows(database)
@@ -315,36 +257,6 @@ def waiting(database: Database) -> sa.Select[Any]:
     if not database.is_postgresql:  # what SQLite takes the partial index for: its condition, word for word
         here.append(sa.literal_column("status in ('ENQUEUED', 'PENDING')"))
     return sa.select(sa.literal_column("1")).select_from(table).where(*here).limit(1)
-
-
-def bound_waits() -> None:
-    """Bounds how long this process stays away from a database that is back, or that others use as well.
-
-    DBOS doubles its wait after every connection that failed, up to 90 s: after an outage of a minute a worker may do
-    nothing for as long again. It also doubles the time between two looks into a queue, up to 120 s, whenever another
-    worker claimed from it at the same moment; here it looks again at the next poll, as it does where a lock is held.
-    """
-    import dbos._sys_db
-    from dbos._dbos import _get_dbos_instance
-
-    vars(dbos._sys_db)["time"] = _ShortWaits()
-    system_database = _get_dbos_instance()._sys_db
-    is_locked, is_contended = system_database.is_lock_conflict, system_database.is_serialization_conflict
-
-    def conflicts(error: Any) -> bool:
-        return is_locked(error) or is_contended(error)
-
-    vars(system_database)["is_lock_conflict"] = conflicts
-
-
-class _ShortWaits:
-    """The module `time` with a bound on `sleep`."""
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(time, name)
-
-    def sleep(self, seconds: float) -> None:
-        time.sleep(min(seconds, LONGEST_WAIT_SECONDS))
 
 
 def _milliseconds(database: Database) -> sa.ColumnElement[Any]:

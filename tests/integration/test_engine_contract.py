@@ -12,9 +12,10 @@ from dbos import DBOS, DBOSConfig, DBOSPortableJSONSerializer
 from psycopg.errors import DiskFull, LockNotAvailable, SerializationFailure
 from sqlalchemy.exc import DBAPIError
 
+from schemas.problem import Problem
 from services.database import Database, open_database, tables
 from services.database.clock import clock
-from services.engine import flow, queues, system
+from services.engine import flow, queues, steering, system
 from services.engine.claims import Claims
 from services.engine.jobs import Jobs
 from services.engine.liveness import Liveness, host
@@ -126,14 +127,14 @@ def test_waits_for_the_database_are_short_and_contention_is_looked_at_again_soon
     from dbos import _sys_db
     from dbos._dbos import _get_dbos_instance
 
-    system.bound_waits()
+    steering.steer(engine.database, {})
     slept: list[float] = []
     assert _sys_db.time.time() > 0.0
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(system.time, "sleep", slept.append)
+        patch.setattr(steering.time, "sleep", slept.append)
         _sys_db.time.sleep(90.0)
         _sys_db.time.sleep(0.5)
-    assert slept == [system.LONGEST_WAIT_SECONDS, 0.5]
+    assert slept == [steering.LONGEST_WAIT_SECONDS, 0.5]
     database = _get_dbos_instance()._sys_db
     assert database.is_lock_conflict(DBAPIError("", None, SerializationFailure()))
     assert database.is_lock_conflict(DBAPIError("", None, LockNotAvailable()))
@@ -143,9 +144,60 @@ def test_waits_for_the_database_are_short_and_contention_is_looked_at_again_soon
 def test_recovering_the_dead_again_leaves_what_somebody_else_has_claimed(engine: Engine) -> None:
     engine.enqueue()
     engine.claimed_by("somebody")
-    system.recover(["dead"])
+    with engine.database.write() as connection:
+        assert system.recover(connection, engine.database, ["dead"]) == 0
     assert engine.row()["executor_id"] == "somebody"
     assert engine.row()["status"] == "PENDING"
+
+
+def test_recovering_the_dead_leaves_what_was_cancelled_since(engine: Engine) -> None:
+    engine.enqueue()
+    engine.claimed_by("dead")
+    DBOS.cancel_workflow(ID)
+    with engine.database.write() as connection:
+        assert system.recover(connection, engine.database, ["dead"]) == 0
+    assert engine.row()["status"] == "CANCELLED"
+
+
+def test_what_dbos_offers_publicly_would_take_work_from_the_living_and_forget_attempts(engine: Engine) -> None:
+    """Why the engine queues again by a statement of its own; it can go when this fails."""
+    engine.enqueue()
+    engine.claimed_by("somebody")
+    DBOS.resume_workflows([ID], queue_name="render")
+    row = engine.row()
+    assert (row["status"], row["recovery_attempts"]) == ("ENQUEUED", 0)
+    DBOS.cancel_workflow(ID)
+    DBOS.resume_workflows([ID], queue_name="render")
+    assert engine.row()["status"] == "ENQUEUED"
+
+
+def test_our_recovery_is_that_of_dbos(engine: Engine) -> None:
+    for workflow_id in ("a/0", "b/0"):
+        engine.enqueue(workflow_id)
+        engine.claimed_by(f"dead {workflow_id}", workflow_id)
+    DBOS._recover_pending_workflows(["dead a/0"])
+    with engine.database.write() as connection:
+        assert system.recover(connection, engine.database, ["dead b/0", "dead too"]) == 1
+    theirs, ours = engine.row("a/0"), engine.row("b/0")
+    assert abs(theirs.pop("updated_at") - ours.pop("updated_at")) < 60_000
+    for name in ("workflow_uuid", "created_at", "executor_id"):
+        theirs.pop(name), ours.pop(name)
+    assert ours == theirs
+
+
+def test_a_dbos_that_cannot_be_steered_is_said_before_work_is_taken(engine: Engine) -> None:
+    from dbos._dbos import _get_dbos_instance
+
+    inner = _get_dbos_instance()._sys_db
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(inner, "dequeue_scopes", None)
+        with pytest.raises(Problem, match=r"lacks what the engine needs: dequeue_scopes\."):
+            steering.steer(engine.database, {"render": 1})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(steering, "CONCURRENCY", "_of_another_version")
+        with pytest.raises(Problem, match=r"lacks what the engine needs: _of_another_version\."):
+            steering.steer(engine.database, {"render": 1})
+    assert "get_queue" not in vars(inner), "nothing is half replaced"
 
 
 def test_enqueueing_an_id_again_changes_nothing(engine: Engine) -> None:
@@ -202,7 +254,7 @@ def test_a_claim_stays_within_the_process_s_own_slots(engine: Engine) -> None:
     assert registered is not None
     assert registered._worker_concurrency == 0
     slots = {"render": 2}
-    system.steer_claims(engine.database, slots)
+    steering.steer(engine.database, slots)
     for number in range(3):
         engine.enqueue(f"t/{number}", priority=3 - number)
     queue = system_database.get_queue("render")
@@ -218,7 +270,7 @@ def test_a_queue_is_claimed_from_only_while_something_waits_in_it(engine: Engine
 
     system_database = _get_dbos_instance()._sys_db
     assert system_database.dequeue_scopes("render") == [None]
-    system.steer_claims(engine.database, {"render": 1})
+    steering.steer(engine.database, {"render": 1})
     assert system_database.dequeue_scopes("render") == []
     engine.enqueue()
     assert system_database.dequeue_scopes("render") == [None]
