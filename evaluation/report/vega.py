@@ -36,6 +36,9 @@ _WIDTH: Final = 600
 _FONT: Final = 'system-ui, "DejaVu Sans", sans-serif'
 _TITLES: Final = {"titleColor": looks.INK, "titleFont": _FONT, "titleFontSize": 12, "titleFontWeight": "normal"}
 _LABELS: Final = {"labelColor": looks.SOFT, "labelFont": _FONT, "labelFontSize": 12}
+_COLUMNS: Final = "max(1, floor(((containerSize()[0] || width + 70) - 70) / 240))"
+"""Of a legend: as many as its place has room for, beside an axis. The plot's own width changes while it is fitted, and
+a legend that followed it would be cut off after each change of the window."""
 _CONFIG: Final[Spec] = {
     "background": looks.PAGE,
     "font": _FONT,
@@ -55,7 +58,7 @@ _CONFIG: Final[Spec] = {
         "labelLimit": 320,
         "orient": "bottom",
         "direction": "horizontal",
-        "columns": {"expr": "max(1, floor(width / 240))"},
+        "columns": {"expr": _COLUMNS},
         "symbolSize": 90,
         "title": None,
     },

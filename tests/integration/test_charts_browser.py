@@ -67,3 +67,15 @@ def test_the_legend_picks_a_series(tab: Tab) -> None:
     after = [mark.get_attribute("opacity") for mark in marks.all()]
     assert set(before) <= {"1", None}
     assert after.count("0.12") == 1
+
+
+def test_a_legend_is_whole_after_the_window_has_changed(tab: Tab) -> None:
+    whole = """[...document.querySelectorAll('.chart')].every((one) => {
+        const end = one.querySelector('svg').getBoundingClientRect().bottom;
+        return [...one.querySelectorAll('.role-legend-label')].every((at) => at.getBoundingClientRect().bottom <= end);
+    })"""
+    tab.until(whole)
+    width = tab.page.viewport_size["width"]
+    tab.page.set_viewport_size({"width": width, "height": 500})
+    tab.page.wait_for_timeout(500)
+    tab.until(whole)
