@@ -26,7 +26,7 @@ def said_defaults(factors: Sequence[float], loads: Sequence[float]) -> str:
     """
     views = "the view to measure holds" if len(loads) == 1 else f"the {len(loads)} views to measure hold"
     return (
-        f"Budgets {_listed(factors)} (x width x height), because {views} {_range(loads)} transparent fragments a "
+        f"Budgets {_listed(factors)} (x width x height), because {views} {_range(loads)} transparent fragments per "
         f"pixel: a budget decides something where it holds up to {MOST_HELD:.0%} of a view's fragments. --budgets "
         "gives others."
     )
@@ -42,7 +42,7 @@ def said_complete(factors: Sequence[float], loads: Sequence[float]) -> str:
     views = "the captured view has" if len(loads) == 1 else f"the {len(loads)} captured views have"
     smallest = f"The budget {factors[0]:g}" if len(factors) == 1 else f"Even the smallest budget, {factors[0]:g},"
     return (
-        f"{smallest} holds all fragments, as {views} {_range(loads)} a pixel: every technique is exact within it, so "
+        f"{smallest} holds all fragments, as {views} {_range(loads)} per pixel: every technique is exact within it, so "
         "there is nothing to measure."
     )
 

@@ -72,7 +72,7 @@ def _verdict(advice: Advice) -> str:
         )
     return (
         f"{_loads(advice)} fragments per pixel: {needs}, and {memory} at {choice.size} hold "
-        f"{number(choice.pays_above)} a pixel. Use {said(choice.chosen)}: {_mib(choice.chosen, choice)} MiB, "
+        f"{number(choice.pays_above)} per pixel. Use {said(choice.chosen)}: {_mib(choice.chosen, choice)} MiB, "
         f"{said_error(choice.chosen.mse)}, the least error that fits.{_ties(choice)}"
     )
 

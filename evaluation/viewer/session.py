@@ -226,7 +226,7 @@ class Session:
         wish, rendered = shot.wish, shot.rendered
         lines = [f"{wish.technique} {self._bundle(shot)}".rstrip()]
         if TECHNIQUES[wish.technique].family == "bounded":
-            lines.append(f"F {wish.factor:g} a pixel, {shot.budget.fragments:,}; tail {shot.budget.tail}")
+            lines.append(f"F {wish.factor:g} per pixel, {shot.budget.fragments:,}; tail {shot.budget.tail}")
         passes = ", ".join(f"{name}{_JOINED}{taken:.1f}" for name, taken in shot.recording.passes.items())
         times = textwrap.wrap(f"{shot.recording.milliseconds:.1f} ms: {passes}", _WRAP, break_on_hyphens=False)
         lines += [line.replace(_JOINED, " ") for line in times]

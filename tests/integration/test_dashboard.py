@@ -323,7 +323,7 @@ def test_pages_with_data(admin: Visitor, shown: Shown) -> None:
     assert "1.20 times the version before" in model
     assert len(DATA.findall(model)) == 3
     assert "<dd>73, " in model  # weights: 1 -> 4 -> 13 with biases
-    assert "56 a pixel" in model
+    assert "56 per pixel" in model
     assert "Commercial use is NOT CLEARED: 1 of 1 training scenes have no licence" in model
     assert '<pre class="card"># Model card: glass' in model
     scene = text[f"/scenes/{shown.scene}"]

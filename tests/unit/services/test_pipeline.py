@@ -207,10 +207,10 @@ def test_budgets_that_were_not_given_follow_from_the_held_out_views_and_are_in_t
         (
             600,
             [3.0, 4.0],
-            "Even the smallest budget, 3, holds all fragments, as the 6 captured views have 2.3 a pixel",
+            "Even the smallest budget, 3, holds all fragments, as the 6 captured views have 2.3 per pixel",
             "Give smaller budgets, --budgets 0.25,0.5,1, or render",
         ),
-        (10, None, "The budget 0.05 holds all fragments, as the 6 captured views have 0.039 a pixel", "Render these"),
+        (10, None, "The budget 0.05 holds all fragments, as the 6 captured views have 0.039 per pixel", "Render these"),
     ],
 )
 def test_a_build_whose_budgets_hold_everything_ends_before_its_labels(

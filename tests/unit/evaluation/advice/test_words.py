@@ -27,7 +27,7 @@ def test_exact_is_said_with_its_bytes_and_where_a_budget_pays() -> None:
 def test_a_technique_is_said_with_budget_tail_bundle_bytes_and_error() -> None:
     first = sentences(advise(scene(20.0, DEEP, SUMS), FRAME, 64 * MIB))[0]
     assert "Use bundle (kbuffer-deep), budget 1, binned-12 tail, bundle b@1: 38.1 MiB, MSE 0.100e-5" in first
-    assert "the S-buffer, which is exact, takes 156.4 MiB, and 64.0 MiB at 1000x1000 hold 7.89 a pixel" in first
+    assert "the S-buffer, which is exact, takes 156.4 MiB, and 64.0 MiB at 1000x1000 hold 7.89 per pixel" in first
 
 
 def test_ties_are_said() -> None:

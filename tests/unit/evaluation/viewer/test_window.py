@@ -131,7 +131,7 @@ def test_the_read_out_says_what_it_costs_and_how_far_off_it_is(viewer: Viewer) -
     before = session._lines("left", shot)
     session.rows(0)
     lines = session._lines("left", shot)
-    assert before[:2] == lines[:2] == ["kbuffer", "F 1 a pixel, 7,200; tail density-16"]
+    assert before[:2] == lines[:2] == ["kbuffer", "F 1 per pixel, 7,200; tail density-16"]
     assert before[-1] == "against exact: when the camera rests"
     compared = session.studio.known(shot, False)  # type: ignore[arg-type]
     assert isinstance(compared, Compared)
