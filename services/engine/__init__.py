@@ -7,7 +7,7 @@ Modules, from the bottom up:
     queues      a queue for each role and one for checks, fair shares between jobs
     events      what happened in a job, numbered
     states      transitions of jobs, each one transaction
-    tasks       transitions of tasks, the same
+    task_states  transitions of tasks, the same
     problems    what can go wrong, in words
     progress    how far jobs are, and for how long still
     checks      checks of uploads, fair between keys

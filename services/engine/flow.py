@@ -1,4 +1,4 @@
-"""The workflows: a job, a task, a check of a scene. Everything durable about them lies in `states` and `tasks`."""
+"""The workflows: a job, a task, a check of a scene. What is durable of them lies in `states` and `task_states`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Protocol
 
 from dbos import DBOS
 
-from services.engine.tasks import LOST_EXECUTORS
+from services.engine.task_states import LOST_EXECUTORS
 
 JOB_EXECUTORS = 100
 """Executors that may be lost while they conduct a job; then it fails."""

@@ -21,7 +21,7 @@ from services.database import Database
 from services.engine import states, system
 from services.engine.claims import Claims
 from services.engine.states import Abandoned, Claim
-from services.engine.tasks import Tasks
+from services.engine.task_states import Tasks
 from stages.catalogue import STAGES
 from stages.store import MissingArtifact, StoreAway
 from stages.tasks import FACTS, JsonFacts, StageName, Task

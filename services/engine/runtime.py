@@ -27,7 +27,7 @@ from services.engine.liveness import Liveness
 from services.engine.rooms import KERNELS, Scratch
 from services.engine.runner import DurableRunner
 from services.engine.states import Abandoned, Cancelled, Claim
-from services.engine.tasks import Place, Tasks
+from services.engine.task_states import Place, Tasks
 from services.engine.work import Worker
 from services.problems import document_of, summary_of
 from services.settings import Settings

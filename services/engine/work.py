@@ -22,7 +22,7 @@ from services.engine.children import Assignment, Child, ChildOptions, Hooks, Los
 from services.engine.claims import Claims
 from services.engine.events import Event
 from services.engine.states import Abandoned, Claim
-from services.engine.tasks import Begun, Place, Tasks
+from services.engine.task_states import Begun, Place, Tasks
 from services.problems import document_of, summary_of
 from services.settings import Settings
 from services.sources import materialise

@@ -15,7 +15,7 @@ from services.database import tables
 from services.engine import states, system
 from services.engine.housekeeping import Housekeeping
 from services.engine.states import Abandoned, Cancelled, Claim
-from services.engine.tasks import Place, Tasks
+from services.engine.task_states import Place, Tasks
 from stages.tasks import Task
 
 ME = "executor-1"
