@@ -179,7 +179,7 @@ function setSplit(stage: Stage, split: number): void {
 
 function setBudget(stage: Stage): void {
   stage.wanted.factor = 2 ** at<HTMLInputElement>("budget").valueAsNumber;
-  at("budget-value").textContent = `${stage.wanted.factor.toPrecision(3)} fragments a pixel`;
+  at("budget-value").textContent = `${stage.wanted.factor.toPrecision(3)} fragments per pixel`;
   stage.draw();
 }
 

@@ -10,7 +10,7 @@ struct Shown {
 @group(0) @binding(2) var<storage, read> right: array<u32>;
 @group(0) @binding(3) var<storage, read> exact: array<u32>;
 
-// Colour maps of services/report/colours.py: sRGB anchors, interpolated linearly.
+// Colour maps of evaluation/report/colours.py: sRGB anchors, interpolated linearly.
 const COUNT = array<vec3f, 8>(
     vec3f(68, 1, 84), vec3f(70, 50, 127), vec3f(54, 92, 141), vec3f(39, 127, 142),
     vec3f(31, 161, 135), vec3f(74, 194, 109), vec3f(159, 218, 58), vec3f(253, 231, 37),
