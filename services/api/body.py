@@ -31,7 +31,9 @@ M = TypeVar("M", bound=BaseModel)
 _CLOSE = {"Connection": "close"}
 """What has not been read would be taken for the next request."""
 
-_TOKENS = re.compile(rb'"(?:[^"\\]|\\.)*"|[\[\]{}]', re.DOTALL)
+_TOKENS = re.compile(rb'"(?:[^"\\]|\\.)*"?|[\[\]{}]', re.DOTALL)
+"""Strings and brackets. A string that does not end goes on to the end: looked for again behind each of its quotation
+marks, it would take the square of its length."""
 
 
 class JsonBody(Generic[M]):
